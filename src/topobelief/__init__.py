@@ -1,0 +1,8 @@
+"""Topological belief space planning: where should a robot drive next, when its map is a pose graph?
+
+`import topobelief as tb` loads nothing heavy; each public name loads its room when it is first used.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

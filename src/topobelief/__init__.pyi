@@ -1,0 +1,16 @@
+from .bounds.entropy_bounds import Bounds as Bounds
+from .bounds.entropy_bounds import entropy_bounds as entropy_bounds
+from .entropy import joint_entropy as joint_entropy
+from .entropy import joint_entropy_estimate as joint_entropy_estimate
+from .graph.action import Action as Action
+from .graph.action import posterior as posterior
+from .graph.pose_graph import PoseGraph as PoseGraph
+from .graph.topology import Topology as Topology
+from .signatures.spanning_trees import log_num_spanning_trees as log_num_spanning_trees
+from .signatures.spanning_trees import spanning_tree_signature as spanning_tree_signature
+from .signatures.von_neumann import von_neumann_entropy as von_neumann_entropy
+from .signatures.von_neumann import von_neumann_entropy_approx as von_neumann_entropy_approx
+from .planning.decision import Decision as Decision
+from .planning.decision_quality import DecisionQuality as DecisionQuality
+from .planning.decision_quality import decision_quality as decision_quality
+from .planning.planner import Planner as Planner
