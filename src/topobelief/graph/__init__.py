@@ -1,0 +1,1 @@
+"""Graphs: their topology, their poses and noise, and the actions that would extend them."""

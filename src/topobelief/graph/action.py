@@ -1,0 +1,203 @@
+"""Candidate actions: the poses and factors that a path would add to the graph.
+
+Under maximum-likelihood observations nothing is re-estimated: new poses sit where the path puts them, and every
+new measurement is the one that the geometry predicts (Kitanov and Indelman, arXiv 1903.00927, section II).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from topobelief.arrays import FloatArray, IntArray, frozen_floats, frozen_ints
+from topobelief.errors import InvalidActionError, InvalidInputError
+from topobelief.graph.information import checked_information
+from topobelief.graph.pose_graph import PoseGraph, checked_pose_rows
+from topobelief.graph.topology import Topology
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class Action:
+    """New poses and the factors among them and to the graph.
+
+    Parameters
+    ----------
+    poses : shape (L, 3) or (L, 7), L >= 0
+        Where the new poses will be, world frame.
+    edges : shape (c, 2)
+        Odometry included. Indices of the graph, then num_poses, num_poses + 1, … for the new poses, in any order
+        and direction; parallel edges and edges among new poses are welcome. No edges at all ("stay") is valid with L = 0.
+    information : shape (c, kappa, kappa) or (kappa, kappa)
+    label
+        What a person calls the action.
+    cost
+        A deterministic cost (length, energy, time), in nats; it adds to the entropy and to its bounds.
+
+    Raises
+    ------
+    InvalidActionError
+        Names the edge to blame. What depends on the graph is checked when the action meets it.
+    """
+
+    poses: FloatArray
+    edges: IntArray
+    information: FloatArray
+    label: str
+    cost: float
+
+    def __init__(
+        self,
+        poses: ArrayLike,
+        edges: ArrayLike,
+        information: ArrayLike,
+        *,
+        label: str = "",
+        cost: float = 0.0,
+    ) -> None:
+        try:
+            raw_information = frozen_floats(information, name="information")
+            tangent_dim = raw_information.shape[-1] if raw_information.ndim >= 2 else 0
+            raw_poses = frozen_floats(poses, name="poses")
+            size = {3: 3, 6: 7}.get(tangent_dim)
+            if raw_poses.size and raw_poses.ndim == 2:
+                size = int(raw_poses.shape[1])
+            checked_poses, group = checked_pose_rows(raw_poses, name="poses", size=size or 3)
+            checked_edges = frozen_ints(edges, name="edges")
+            if checked_edges.size == 0:
+                checked_edges = checked_edges.reshape(0, 2)
+            if checked_edges.ndim != 2 or checked_edges.shape[1] != 2:
+                raise InvalidInputError(f"expected edges of shape (c, 2), got {checked_edges.shape}")
+            checked = checked_information(raw_information, num_edges=len(checked_edges), tangent_dim=group.tangent_dim)
+        except InvalidInputError as error:
+            raise InvalidActionError(str(error), label=label) from None
+        negative = np.flatnonzero((checked_edges < 0).any(axis=1))
+        if negative.size:
+            raise InvalidActionError("expected indices from 0, got a negative one", edge=int(negative[0]), label=label)
+        if not np.isfinite(cost):
+            raise InvalidActionError(f"expected a finite cost in nats, got {cost}", label=label)
+        for name, value in (
+            ("poses", checked_poses),
+            ("edges", checked_edges),
+            ("information", checked),
+            ("label", label),
+            ("cost", float(cost)),
+        ):
+            object.__setattr__(self, name, value)
+
+    @property
+    def num_new_poses(self) -> int:
+        """L."""
+        return len(self.poses)
+
+    @property
+    def num_closures(self) -> int:
+        """Edges beyond the one that each new pose needs to hang on the graph."""
+        return len(self.edges) - self.num_new_poses
+
+
+def check_action(graph: PoseGraph, action: Action, *, index: int | None = None) -> None:
+    """Check what only the graph can tell: dimensions, index range, self-loops, and that every new pose is attached.
+
+    Raises
+    ------
+    InvalidActionError
+        Names the action (by `index`) and the edge.
+    """
+    label = action.label
+    if action.information.shape[-1] != graph.tangent_dim:
+        raise InvalidActionError(
+            f"expected information matrices of size {graph.tangent_dim} for a graph in {graph.group.name}, "
+            f"got {action.information.shape[-1]}",
+            action=index,
+            label=label,
+        )
+    if action.num_new_poses and action.poses.shape[1] != graph.poses.shape[1]:
+        raise InvalidActionError(
+            f"expected poses with {graph.poses.shape[1]} columns, got {action.poses.shape[1]}",
+            action=index,
+            label=label,
+        )
+    total = graph.num_poses + action.num_new_poses
+    out_of_range = np.flatnonzero((action.edges >= total).any(axis=1))
+    if out_of_range.size:
+        edge = int(out_of_range[0])
+        raise InvalidActionError(
+            f"expected indices below {total} ({graph.num_poses} poses and {action.num_new_poses} new ones), "
+            f"got {tuple(action.edges[edge].tolist())}",
+            action=index,
+            edge=edge,
+            label=label,
+        )
+    loops = np.flatnonzero(action.edges[:, 0] == action.edges[:, 1])
+    if loops.size:
+        edge = int(loops[0])
+        raise InvalidActionError(
+            f"expected an edge between two poses, got a self-loop at {action.edges[edge, 0]}",
+            action=index,
+            edge=edge,
+            label=label,
+        )
+    if action.num_new_poses:
+        contracted = np.maximum(action.edges - graph.num_poses + 1, 0)  # the prior graph as one node, 0
+        contracted = contracted[contracted[:, 0] != contracted[:, 1]]
+        labels = Topology(action.num_new_poses + 1, contracted).component_labels
+        loose = np.flatnonzero(labels[1:] != labels[0])
+        if loose.size:
+            raise InvalidActionError(
+                f"expected every new pose to be attached to the graph, got new pose {graph.num_poses + loose[0]} "
+                "without a path to it",
+                action=index,
+                label=label,
+            )
+
+
+def check_actions(graph: PoseGraph, actions: Sequence[Action]) -> None:
+    """Check a list of actions before any work is done.
+
+    Raises
+    ------
+    InvalidActionError
+        Where the list is empty or names the first bad action.
+    """
+    if len(actions) == 0:
+        raise InvalidActionError("expected at least one action to choose from, got none")
+    for index, action in enumerate(actions):
+        check_action(graph, action, index=index)
+
+
+def posterior(graph: PoseGraph, action: Action) -> PoseGraph:
+    """The graph after the action: the from-scratch reference for everything incremental.
+
+    Parameters
+    ----------
+    graph
+        The prior, n poses.
+    action
+        L new poses; their measurements are the ones that the geometry predicts.
+
+    Returns
+    -------
+    PoseGraph
+        n + L poses: the prior's, then the new ones; likewise the edges.
+
+    Raises
+    ------
+    InvalidActionError
+        Where the action does not fit the graph.
+    """
+    check_action(graph, action)
+    poses = np.concatenate([graph.poses, action.poses]) if action.num_new_poses else graph.poses
+    i, j = action.edges.T
+    predicted = graph.group.between(poses[i], poses[j])
+    new_ids = int(graph.ids.max()) + 1 + np.arange(action.num_new_poses)
+    return PoseGraph._from_checked(  # pyright: ignore[reportPrivateUsage]  (the two modules are one room)
+        Topology(len(poses), np.concatenate([graph.edges, action.edges])),
+        poses,
+        np.concatenate([graph.measurements, predicted]),
+        np.concatenate([graph.information, action.information]),
+        np.concatenate([graph.ids, new_ids]),
+        graph.fixed,
+    )

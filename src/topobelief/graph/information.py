@@ -1,0 +1,119 @@
+"""Information matrices of edges: checked, and described by what the theory asks of them.
+
+Notation (THEORY of the docs, sections 3 to 5): Omega = [[O_pp, O_pr], [O_rp, O_rr]] on the tangent
+(translation, rotation); k and q the dimensions of positions and rotations;
+O_r|p = O_rr - O_rp O_pp^-1 O_pr the rotation's information once the position is given away.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from topobelief.arrays import FloatArray, frozen_floats
+from topobelief.errors import InvalidGraphError
+
+_SPLITS = {3: (2, 1), 6: (3, 3)}
+_SYMMETRY_TOLERANCE = 1e-9
+_ISOTROPY_TOLERANCE = 1e-12
+
+
+def tangent_split(tangent_dim: int) -> tuple[int, int]:
+    """(k, q): how many of the kappa tangent dimensions are positions, and how many rotations.
+
+    Raises
+    ------
+    InvalidGraphError
+        Where kappa is neither 3 (SE(2)) nor 6 (SE(3)).
+    """
+    if tangent_dim not in _SPLITS:
+        raise InvalidGraphError(f"expected information matrices of size 3 (SE(2)) or 6 (SE(3)), got {tangent_dim}")
+    return _SPLITS[tangent_dim]
+
+
+def checked_information(information: ArrayLike, *, num_edges: int, tangent_dim: int) -> FloatArray:
+    """Information matrices of shape (num_edges, kappa, kappa), read-only; one matrix is shared by all edges.
+
+    Raises
+    ------
+    InvalidGraphError
+        Names the first edge whose matrix is not finite, symmetric and positive definite.
+    """
+    array = frozen_floats(information, name="information")
+    shape = (num_edges, tangent_dim, tangent_dim)
+    if array.ndim == 2 and array.shape == shape[1:]:
+        array = np.broadcast_to(array, shape)
+        if num_edges:
+            _require_positive_definite(array[:1])
+        return array
+    if array.size == 0 and num_edges == 0:
+        return np.broadcast_to(np.eye(tangent_dim), shape)
+    if array.shape != shape:
+        raise InvalidGraphError(
+            f"expected information of shape {shape} or {shape[1:]} (one matrix for all edges), got {array.shape}"
+        )
+    _require_positive_definite(array)
+    return array
+
+
+def _require_positive_definite(information: FloatArray) -> None:
+    not_finite = np.flatnonzero(~np.isfinite(information).all(axis=(1, 2)))
+    if not_finite.size:
+        raise InvalidGraphError(f"expected a finite information matrix, got nan or inf at edge {not_finite[0]}")
+    diagonal = np.diagonal(information, axis1=1, axis2=2)
+    flat = np.flatnonzero(~(diagonal > 0).all(axis=1))
+    if flat.size == 0:
+        scale = 1 / np.sqrt(diagonal)
+        scaled = information * scale[:, :, None] * scale[:, None, :]
+        asymmetric = np.flatnonzero(
+            np.abs(scaled - scaled.transpose(0, 2, 1)).max(axis=(1, 2), initial=0.0) > _SYMMETRY_TOLERANCE
+        )
+        if asymmetric.size:
+            raise InvalidGraphError(f"expected a symmetric information matrix, got an asymmetric one at edge {asymmetric[0]}")
+        flat = np.flatnonzero(np.linalg.eigvalsh(scaled)[:, 0] <= np.finfo(float).eps * information.shape[1])
+    if flat.size:
+        raise InvalidGraphError(
+            f"expected a positive definite information matrix, got an indefinite or singular one at edge {flat[0]}"
+        )
+
+
+def shared_information(information: FloatArray) -> FloatArray | None:
+    """The one matrix that all edges share, or None."""
+    if len(information) == 0:
+        return None
+    first = information[0]
+    same = np.allclose(information, first, rtol=_ISOTROPY_TOLERANCE, atol=0) if information.strides[0] else True
+    return first if same else None
+
+
+def isotropic_weights(information: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+    """(w_p, w_r), each of shape (num_edges,), where every Omega is blkdiag(w_p I_k, w_r I_q); None elsewhere."""
+    k, q = tangent_split(information.shape[-1])
+    w_p, w_r = information[:, 0, 0], information[:, k, k]
+    block = np.zeros(information.shape[1:])
+    block[:k, :k] = np.eye(k)
+    rotation = np.zeros_like(block)
+    rotation[k:, k:] = np.eye(q)
+    expected = w_p[:, None, None] * block + w_r[:, None, None] * rotation
+    scale = np.sqrt(np.diagonal(information, axis1=1, axis2=2))
+    deviation = np.abs(information - expected) / (scale[:, :, None] * scale[:, None, :])
+    if deviation.max(initial=0.0) > _ISOTROPY_TOLERANCE:
+        return None
+    return w_p, w_r
+
+
+def rotation_information_given_position(information: FloatArray) -> FloatArray:
+    """O_r|p = O_rr - O_rp O_pp^-1 O_pr, shape (num_edges, q, q)."""
+    k, _ = tangent_split(information.shape[-1])
+    o_pp, o_pr, o_rr = information[:, :k, :k], information[:, :k, k:], information[:, k:, k:]
+    if not o_pr.any():
+        return o_rr
+    return o_rr - o_pr.transpose(0, 2, 1) @ np.linalg.solve(o_pp, o_pr)
+
+
+def scalar_weights(information: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """w_p = |O_pp|^(1/k) and w_r = |O_r|p|^(1/q), each of shape (num_edges,): noise as one number per part."""
+    k, q = tangent_split(information.shape[-1])
+    log_det_p = np.linalg.slogdet(information[:, :k, :k])[1]
+    log_det_r = np.linalg.slogdet(rotation_information_given_position(information))[1]
+    return np.exp(log_det_p / k), np.exp(log_det_r / q)
