@@ -1,0 +1,109 @@
+"""Sparsity patterns of block matrices on graphs, built once and filled many times.
+
+The upper triangle of a block matrix with one block a node and one a pair of adjacent nodes, in compressed columns,
+with the held (anchored) nodes left out. Parallel edges add into one block.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from topobelief.arrays import BoolArray, FloatArray, IntArray
+from topobelief.linalg.edge_form import EdgeForm
+
+
+@dataclass(frozen=True, slots=True)
+class BlockPattern:
+    """Where the blocks of the free nodes go, and which edges add into which block."""
+
+    size: int
+    block_size: int
+    indptr: IntArray
+    indices: IntArray
+    gather: IntArray  # entry of the compressed columns -> entry of the stacked blocks
+    diagonal_sum: sparse.csr_array  # free node <- edge ends (i then j)
+    off_diagonal_sum: sparse.csr_array  # upper block <- edges, those stored (i < j) then those stored (i > j)
+    flipped: BoolArray  # among edges between free nodes: stored with i > j
+    inner: IntArray  # edges between free nodes
+
+    @staticmethod
+    def build(edges: IntArray, free: BoolArray, block_size: int) -> BlockPattern:
+        """Pattern of the nodes marked `free`.
+
+        Parameters
+        ----------
+        edges : shape (m, 2)
+        free : shape (num_nodes,)
+        block_size
+            Variables per node.
+        """
+        b, num_free, num_edges = block_size, int(free.sum()), len(edges)
+        position = np.cumsum(free) - 1
+        ends = edges.T.ravel()
+        touching = np.flatnonzero(free[ends])
+        diagonal_sum = sparse.csr_array(
+            (np.ones(len(touching)), (position[ends[touching]], touching)), shape=(num_free, 2 * num_edges)
+        )
+        inner = np.flatnonzero(free[edges].all(axis=1))
+        low, high = np.sort(position[edges[inner]], axis=1).T
+        keys, block_of_edge = np.unique(high * num_free + low, return_inverse=True)
+        off_diagonal_sum = sparse.csr_array(
+            (np.ones(len(inner)), (block_of_edge, np.arange(len(inner)))), shape=(len(keys), len(inner))
+        )
+        # entries of all stacked blocks, the upper triangle of diagonal blocks and the whole of the others
+        block_row = np.concatenate([np.arange(num_free), keys % num_free if num_free else keys])
+        block_column = np.concatenate([np.arange(num_free), keys // num_free if num_free else keys])
+        r, c = (index.ravel() for index in np.indices((b, b)))
+        row = (block_row[:, None] * b + r).ravel()
+        column = (block_column[:, None] * b + c).ravel()
+        upper = np.flatnonzero(row <= column)
+        gather = upper[np.argsort(column[upper] * (num_free * b) + row[upper], kind="stable")]
+        counts = np.bincount(column[gather], minlength=num_free * b)
+        return BlockPattern(
+            size=num_free * b,
+            block_size=b,
+            indptr=np.concatenate([[0], np.cumsum(counts)]),
+            indices=row[gather],
+            gather=gather,
+            diagonal_sum=diagonal_sum,
+            off_diagonal_sum=off_diagonal_sum,
+            flipped=position[edges[inner, 0]] > position[edges[inner, 1]],
+            inner=inner,
+        )
+
+    def upper(self, form: EdgeForm, *, shift: float = 0.0) -> sparse.csc_array:
+        """Upper triangle of the form's matrix plus `shift` times I; explicit zeros stay, so equal patterns stay equal."""
+        b = self.block_size
+        diagonal = self.diagonal_blocks(form) + shift * np.eye(b)
+        cross = form.rows_i[self.inner].transpose(0, 2, 1) @ form.rows_j[self.inner]
+        cross = np.where(self.flipped[:, None, None], cross.transpose(0, 2, 1), cross)
+        off_diagonal = self.off_diagonal_sum @ cross.reshape(-1, b * b)
+        data = np.concatenate([diagonal.ravel(), off_diagonal.ravel()])[self.gather]
+        return sparse.csc_array((data, self.indices, self.indptr), shape=(self.size, self.size))
+
+    def diagonal_blocks(self, form: EdgeForm) -> FloatArray:
+        """Diagonal blocks of the form's matrix, shape (num_free, b, b)."""
+        ends = np.concatenate([form.rows_i, form.rows_j])
+        b = self.block_size
+        return (self.diagonal_sum @ (ends.transpose(0, 2, 1) @ ends).reshape(-1, b * b)).reshape(-1, b, b)
+
+    def magnitude(self, form: EdgeForm) -> FloatArray:
+        """Sum of squared term sizes behind each diagonal entry, shape (size,)."""
+        return (self.diagonal_sum @ np.concatenate([form.magnitude_i, form.magnitude_j]) ** 2).ravel()
+
+    def rows_transposed_times(self, form: EdgeForm, values: FloatArray) -> FloatArray:
+        """Sum of R_e^T values_e over edges on the free variables; values of shape (m, r), result (size,)."""
+        pulled = np.concatenate([form.rows_i, form.rows_j]).transpose(0, 2, 1) @ np.concatenate([values, values])[..., None]
+        return (self.diagonal_sum @ pulled[..., 0]).ravel()
+
+    def dense_rows(self, form: EdgeForm) -> FloatArray:
+        """All rows on all free variables, dense, shape (m r, size)."""
+        num_edges, r, b = form.rows_i.shape
+        dense = np.zeros((num_edges, r, self.size // b if b else 0, b))
+        node, slot = self.diagonal_sum.tocoo().coords
+        ends = np.concatenate([form.rows_i, form.rows_j])
+        dense[slot % num_edges, :, node] = ends[slot]
+        return dense.reshape(num_edges * r, self.size)
