@@ -1,0 +1,139 @@
+"""Signatures, bounds and exact entropies of actions, each from scratch on the posterior graph.
+
+The reference for everything faster: every quantity is that of `posterior(graph, action)`. Only what all actions share, the
+prior's whitened rows, is computed once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from topobelief.bounds import log_det_bounds
+from topobelief.graph.action import Action, posterior
+from topobelief.graph.fisher import FisherRows, fisher_rows
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.linalg import LogDet, LogDetSolver
+from topobelief.planning.objectives import ObjectiveName, PosteriorSize, objective_value
+from topobelief.signatures.spanning_trees import map_signature_estimate, spanning_tree_estimate
+from topobelief.signatures.von_neumann import von_neumann_entropy, von_neumann_entropy_approx
+
+SignatureName = Literal["spanning_trees", "von_neumann", "von_neumann_approx"]
+
+
+class PosteriorEvaluation:
+    """One action's posterior; what several quantities share is computed once.
+
+    Parameters
+    ----------
+    graph
+        The prior.
+    prior_rows
+        Its whitened rows.
+    action
+        Checked against the prior.
+    anchor
+        The pose that bounds hold.
+    """
+
+    def __init__(self, graph: PoseGraph, prior_rows: FisherRows, action: Action, anchor: int) -> None:
+        self._prior, self._prior_rows, self._anchor = graph, prior_rows, anchor
+        self._posterior = posterior(graph, action)
+
+    @cached_property
+    def _new_rows(self) -> FisherRows:
+        return fisher_rows(self._posterior, first_edge=self._prior.num_edges)
+
+    @cached_property
+    def _rows(self) -> FisherRows:
+        return self._prior_rows.joined(self._new_rows)
+
+    def size(self, objective: ObjectiveName) -> PosteriorSize:
+        """What the objective needs besides ln det I."""
+        num_existing, tangent_dim = self._prior.num_poses, self._prior.tangent_dim
+        num_new = self._posterior.num_poses - num_existing
+        if objective != "map" or num_new == 0:
+            return PosteriorSize(num_existing, num_new, tangent_dim)
+        solver = LogDetSolver(self._new_rows.edges, self._posterior.num_poses, np.arange(num_existing))
+        return PosteriorSize(num_existing, num_new, tangent_dim, solver.log_det(self._new_rows.joint()))
+
+    def signature(self, name: SignatureName, objective: ObjectiveName, *, normalized: bool) -> LogDet:
+        """The raw signature; for spanning trees the one that belongs to the objective."""
+        topology, information = self._posterior.topology, self._posterior.information
+        if name == "von_neumann":
+            return LogDet(von_neumann_entropy(topology), 0.0)
+        if name == "von_neumann_approx":
+            return LogDet(von_neumann_entropy_approx(topology, information=information if normalized else None), 0.0)
+        if objective == "map":
+            return map_signature_estimate(topology, information, self._prior.num_poses)
+        joint = spanning_tree_estimate(topology, information)
+        num_free = topology.num_nodes - 1
+        return (1 / num_free) * joint if objective == "per_pose" and num_free else joint
+
+    def bounds(self, family: str, determinant: str, objective: ObjectiveName) -> tuple[LogDet, LogDet]:
+        """(lower, upper) bounds of the objective."""
+        solver = LogDetSolver(self._rows.edges, self._posterior.num_poses, self._anchor)
+        bounds = log_det_bounds(self._rows, solver, family=family, determinant=determinant)
+        size = self.size(objective)
+        return objective_value(objective, bounds.upper, size), objective_value(objective, bounds.lower, size)
+
+    def entropy(self, objective: ObjectiveName) -> LogDet:
+        """The exact objective."""
+        form = self._rows.joint()
+        solver = LogDetSolver(self._rows.edges, self._posterior.num_poses, form.strongest_node())
+        return objective_value(objective, solver.log_det(form), self.size(objective))
+
+
+@dataclass(frozen=True)
+class ScratchEvaluation:
+    """Quantities of any action on one prior, from scratch.
+
+    Parameters
+    ----------
+    graph
+        The prior; connected.
+    objective, signature, normalized, family, determinant, anchor
+        As for `topobelief.Planner`.
+    """
+
+    graph: PoseGraph
+    objective: ObjectiveName
+    signature: SignatureName
+    normalized: bool
+    family: str
+    determinant: str
+    anchor: int
+
+    @cached_property
+    def _prior_rows(self) -> FisherRows:
+        return fisher_rows(self.graph)
+
+    def of(self, action: Action) -> ActionEvaluation:
+        """The quantities of one action, computed when asked for."""
+        return ActionEvaluation(self, PosteriorEvaluation(self.graph, self._prior_rows, action, self.anchor))
+
+
+@dataclass(frozen=True, slots=True)
+class ActionEvaluation:
+    """What a decision asks of one action."""
+
+    session: ScratchEvaluation
+    posterior: PosteriorEvaluation
+
+    def signature(self) -> float:
+        """Raw signature; the larger, the better."""
+        session = self.session
+        return self.posterior.signature(session.signature, session.objective, normalized=session.normalized).value
+
+    def bounds(self) -> tuple[float, float]:
+        """LB and UB of the objective, cost excluded, widened by their rounding errors."""
+        session = self.session
+        lower, upper = self.posterior.bounds(session.family, session.determinant, session.objective)
+        return lower.value - lower.error, upper.value + upper.error
+
+    def entropy(self) -> LogDet:
+        """The exact objective, cost excluded, with its rounding error."""
+        return self.posterior.entropy(self.session.objective)
