@@ -11,6 +11,8 @@ are 3 tau and 2 tau + ln det(L_tilde + xi^2 D), plus (n - 1) ln |Omega|, D_ii th
 
 from __future__ import annotations
 
+import math
+
 from topobelief.graph.fisher import FisherRows
 from topobelief.linalg import LogDet, LogDetSolver
 
@@ -29,6 +31,11 @@ def fischer_bounds(rows: FisherRows, solver: LogDetSolver, *, hadamard: bool) ->
         Replace ln det I_rr by the sum over its diagonal blocks: looser, and one factorisation less.
     """
     positions = solver.log_det(rows.positions())
-    lower = positions + solver.log_det(rows.rotations_given_positions())
+    ratio = rows.weight_ratio()
+    if ratio is None:
+        lower = positions + solver.log_det(rows.rotations_given_positions())
+    else:  # L_r|p is a multiple of I_pp's Laplacian
+        k, q = rows.group.position_dim, rows.group.rotation_dim
+        lower = ((k + q) / k * positions).plus(q * solver.num_free * math.log(ratio))
     rotations = solver.hadamard(rows.rotations()) if hadamard else solver.log_det(rows.rotations())
     return lower, positions + rotations

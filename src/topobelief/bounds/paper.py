@@ -10,6 +10,8 @@ L_tilde and L_tilde + Psi I share their sparsity: one ordering and one symbolic 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from topobelief.errors import InvalidGraphError
@@ -39,12 +41,12 @@ def paper_bounds(rows: FisherRows, solver: LogDetSolver, *, hadamard: bool) -> t
     w_p, w_r = require_equal_noise(rows)
     k, q = rows.group.position_dim, rows.group.rotation_dim
     num_edges = len(rows.edges)
-    positions = solver.log_det(laplacian_form(rows.edges, np.full(num_edges, w_p), multiplicity=k))
-    weighted = laplacian_form(rows.edges, np.full(num_edges, w_r), multiplicity=q)
-    lower = positions + solver.log_det(weighted)
-    shift = w_r * psi(rows)  # w_r (L_tilde + Psi I)
-    rotations = solver.hadamard(weighted, shift=shift) if hadamard else solver.log_det(weighted, shift=shift)
-    return lower, positions + rotations
+    laplacian = laplacian_form(rows.edges, np.ones(num_edges))
+    tau = solver.log_det(laplacian)
+    ln_w_p, ln_w_r = solver.num_free * math.log(w_p), solver.num_free * math.log(w_r)
+    lower = (float(k + q) * tau).plus(k * ln_w_p + q * ln_w_r)
+    shifted = solver.hadamard(laplacian, shift=psi(rows)) if hadamard else solver.log_det(laplacian, shift=psi(rows))
+    return lower, (float(k) * tau + float(q) * shifted).plus(k * ln_w_p + q * ln_w_r)
 
 
 def psi(rows: FisherRows) -> float:

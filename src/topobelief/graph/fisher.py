@@ -96,6 +96,13 @@ class FisherRows:
             weights,
         )
 
+    def weight_ratio(self) -> float | None:
+        """w_r / w_p where the noise is block-isotropic and the ratio is the same on all edges, else None."""
+        if self.weights is None or len(self.edges) == 0:
+            return None
+        ratios = self.weights[1] / self.weights[0]
+        return float(ratios[0]) if np.ptp(ratios) <= UNIT_ROUNDOFF * ratios[0] else None
+
     def squared_lengths(self) -> FloatArray:
         """|d|^2, shape (m,): |C(d)|^2 counts it once in SE(2) and twice in SE(3)."""
         return np.sum(self.lever**2, axis=(1, 2)) / max(1, self.group.rotation_dim - 1)

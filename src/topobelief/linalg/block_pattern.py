@@ -95,9 +95,19 @@ class BlockPattern:
         return (self.diagonal_sum @ np.concatenate([form.magnitude_i, form.magnitude_j]) ** 2).ravel()
 
     def rows_transposed_times(self, form: EdgeForm, values: FloatArray) -> FloatArray:
-        """Sum of R_e^T values_e over edges on the free variables; values of shape (m, r), result (size,)."""
-        pulled = np.concatenate([form.rows_i, form.rows_j]).transpose(0, 2, 1) @ np.concatenate([values, values])[..., None]
-        return (self.diagonal_sum @ pulled[..., 0]).ravel()
+        """Sum of R_e^T values_e over edges, on the free variables.
+
+        Parameters
+        ----------
+        values : shape (m, r, c)
+            A value for each row, in c columns.
+
+        Returns
+        -------
+        array, shape (size, c)
+        """
+        pulled = np.concatenate([form.rows_i.transpose(0, 2, 1) @ values, form.rows_j.transpose(0, 2, 1) @ values])
+        return (self.diagonal_sum @ pulled.reshape(len(pulled), -1)).reshape(self.size, -1)
 
     def dense_rows(self, form: EdgeForm) -> FloatArray:
         """All rows on all free variables, dense, shape (m r, size)."""

@@ -78,6 +78,11 @@ class LogDetSolver:
         self._patterns: dict[int, BlockPattern] = {}
         self._factors: dict[int, Any] = {}
 
+    @property
+    def num_free(self) -> int:
+        """Nodes that are not held."""
+        return int(self._free.sum())
+
     def log_det(self, form: EdgeForm, *, shift: float = 0.0) -> LogDet:
         """ln det of the form's matrix plus `shift` times I, on the free nodes.
 
@@ -145,14 +150,18 @@ def _variances(factor: Any, form: EdgeForm, pattern: BlockPattern, shift: float)
     if pattern.size <= _EXACT_VARIANCE_SIZE:
         return np.array([factor.solve(unit)[i] for i, unit in enumerate(np.eye(pattern.size))])
     rng = np.random.default_rng(0)
+    num_edges, num_rows, _ = form.rows_i.shape
+    samples = pattern.rows_transposed_times(form, _random_signs(rng, (num_edges, num_rows, _NUM_PROBES)))
+    if shift:
+        samples += math.sqrt(shift) * _random_signs(rng, samples.shape)
     squares = np.zeros(pattern.size)
-    for _ in range(_NUM_PROBES):
-        signs = rng.choice([-1.0, 1.0], size=form.rows_i.shape[:2])
-        sample = pattern.rows_transposed_times(form, signs)
-        if shift:
-            sample += math.sqrt(shift) * rng.choice([-1.0, 1.0], size=pattern.size)
+    for sample in samples.T:
         squares += factor.solve(sample) ** 2
     return _PROBE_SAFETY / _NUM_PROBES * squares
+
+
+def _random_signs(rng: np.random.Generator, shape: tuple[int, ...]) -> FloatArray:
+    return np.where(rng.integers(2, size=shape, dtype=np.int8), 1.0, -1.0)
 
 
 def _factor_error(
@@ -167,8 +176,8 @@ def _factor_error(
     factored = upper.diagonal() * variances  # M_ii v_i^2
     assembled = magnitude * variances  # B_i v_i^2
     ordered = factored[order]
-    structure = sparse.csr_array(sparse.csc_array((np.ones(lower.nnz), lower.indices, lower.indptr), shape=lower.shape))
-    operations = np.diff(structure.indptr) + 2
+    structure = sparse.csc_array((np.ones(lower.nnz), lower.indices, lower.indptr), shape=lower.shape)
+    operations = np.bincount(lower.indices, minlength=len(ordered)) + 2
     squares = float((operations * ordered) @ (2 * (structure @ ordered) + ordered))
     pattern = sparse.csc_array((np.ones(upper.nnz), upper.indices, upper.indptr), shape=upper.shape)
     coupled: FloatArray = pattern @ assembled  # pyright: ignore[reportAssignmentType]  (a vector: the stubs allow more)

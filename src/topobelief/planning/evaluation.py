@@ -60,6 +60,11 @@ class PosteriorEvaluation:
         solver = LogDetSolver(self._new_rows.edges, self._posterior.num_poses, np.arange(num_existing))
         return PosteriorSize(num_existing, num_new, tangent_dim, solver.log_det(self._new_rows.joint()))
 
+    @cached_property
+    def _solver(self) -> LogDetSolver:
+        """Holds the anchor; signature and bounds share its ordering and symbolic factors."""
+        return LogDetSolver(self._rows.edges, self._posterior.num_poses, self._anchor)
+
     def signature(self, name: SignatureName, objective: ObjectiveName, *, normalized: bool) -> LogDet:
         """The raw signature; for spanning trees the one that belongs to the objective."""
         topology, information = self._posterior.topology, self._posterior.information
@@ -68,15 +73,16 @@ class PosteriorEvaluation:
         if name == "von_neumann_approx":
             return LogDet(von_neumann_entropy_approx(topology, information=information if normalized else None), 0.0)
         if objective == "map":
-            return map_signature_estimate(topology, information, self._prior.num_poses)
-        joint = spanning_tree_estimate(topology, information)
+            existing = np.arange(self._prior.num_poses)
+            new_solver = LogDetSolver(topology.edges, topology.num_nodes, existing)
+            return map_signature_estimate(topology, information, self._solver, new_solver)
+        joint = spanning_tree_estimate(topology, information, self._solver)
         num_free = topology.num_nodes - 1
         return (1 / num_free) * joint if objective == "per_pose" and num_free else joint
 
     def bounds(self, family: str, determinant: str, objective: ObjectiveName) -> tuple[LogDet, LogDet]:
         """(lower, upper) bounds of the objective."""
-        solver = LogDetSolver(self._rows.edges, self._posterior.num_poses, self._anchor)
-        bounds = log_det_bounds(self._rows, solver, family=family, determinant=determinant)
+        bounds = log_det_bounds(self._rows, self._solver, family=family, determinant=determinant)
         size = self.size(objective)
         return objective_value(objective, bounds.upper, size), objective_value(objective, bounds.lower, size)
 

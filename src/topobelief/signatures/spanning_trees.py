@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from topobelief.arrays import FloatArray, IntArray
+from topobelief.arrays import FloatArray
 from topobelief.graph.information import checked_information, scalar_weights, shared_information, tangent_split
 from topobelief.graph.topology import Topology, checked_weights
 from topobelief.linalg import LogDet, LogDetSolver, laplacian_form
@@ -49,7 +49,8 @@ def log_num_spanning_trees(topology: Topology, *, weights: ArrayLike | None = No
     5.0
     """
     topology.require_connected()
-    return _tau(topology, checked_weights(topology, weights), held=0).value
+    solver = LogDetSolver(topology.edges, topology.num_nodes, 0)
+    return solver.log_det(laplacian_form(topology.edges, checked_weights(topology, weights))).value
 
 
 def spanning_tree_signature(topology: Topology, information: ArrayLike) -> float:
@@ -73,44 +74,39 @@ def spanning_tree_signature(topology: Topology, information: ArrayLike) -> float
     InvalidGraphError
         Where an information matrix is malformed.
     """
-    return spanning_tree_estimate(topology, information).value
-
-
-def spanning_tree_estimate(topology: Topology, information: ArrayLike) -> LogDet:
-    """`spanning_tree_signature` with the estimate of its rounding error."""
     topology.require_connected()
     array = np.asarray(information)
     tangent_dim = int(array.shape[-1]) if array.ndim else 0
     tangent_split(tangent_dim)
     checked = checked_information(array, num_edges=topology.num_edges, tangent_dim=tangent_dim)
-    constant = (topology.num_nodes - 1) * tangent_dim / 2 * math.log(2 * math.pi * math.e)
-    return (0.5 * weighted_trees(topology, checked, held=0)).plus(-constant)
+    return spanning_tree_estimate(topology, checked, LogDetSolver(topology.edges, topology.num_nodes, 0)).value
 
 
-def map_signature_estimate(topology: Topology, information: FloatArray, num_existing: int) -> LogDet:
+def spanning_tree_estimate(topology: Topology, information: FloatArray, solver: LogDetSolver) -> LogDet:
+    """`spanning_tree_signature` of checked input with its rounding error; the solver holds any one node."""
+    constant = (topology.num_nodes - 1) * information.shape[-1] / 2 * math.log(2 * math.pi * math.e)
+    return (0.5 * weighted_trees(topology, information, solver)).plus(-constant)
+
+
+def map_signature_estimate(
+    topology: Topology, information: FloatArray, solver: LogDetSolver, new_solver: LogDetSolver
+) -> LogDet:
     """s_map: trees of the whole graph over those of its new part, the existing nodes contracted to one; with its error.
 
-    s_map = 1/2 [k (tau_p - ln det L_p,nn) + q (tau_r - ln det L_r,nn)]: the signature of what the first
-    `num_existing` nodes gain (docs, the mathematics, section 11). No noise constant is left in it.
+    s_map = 1/2 [k (tau_p - ln det L_p,nn) + q (tau_r - ln det L_r,nn)]: the signature of what the existing nodes gain (docs,
+    the mathematics, section 11). `solver` holds any one node, `new_solver` all that exist.
     """
-    topology.require_connected()
-    whole = weighted_trees(topology, information, held=0)
-    new_part = weighted_trees(topology, information, held=np.arange(num_existing))
-    return 0.5 * (whole - new_part)
+    whole = weighted_trees(topology, information, solver)
+    return 0.5 * (whole - weighted_trees(topology, information, new_solver))
 
 
-def weighted_trees(topology: Topology, information: FloatArray, held: int | IntArray) -> LogDet:
-    """k tau_p + q tau_r with the `held` nodes' rows and columns removed."""
+def weighted_trees(topology: Topology, information: FloatArray, solver: LogDetSolver) -> LogDet:
+    """k tau_p + q tau_r, without the nodes that the solver holds."""
     tangent_dim = int(information.shape[-1])
     k, q = tangent_split(tangent_dim)
     if shared_information(information) is not None:
-        num_free = topology.num_nodes - np.size(held)
-        tau = _tau(topology, np.ones(topology.num_edges), held)
-        return (float(tangent_dim) * tau).plus(num_free * float(np.linalg.slogdet(information[0])[1]))
+        tau = solver.log_det(laplacian_form(topology.edges, np.ones(topology.num_edges)))
+        return (float(tangent_dim) * tau).plus(solver.num_free * float(np.linalg.slogdet(information[0])[1]))
     w_p, w_r = scalar_weights(information)
-    return float(k) * _tau(topology, w_p, held) + float(q) * _tau(topology, w_r, held)
-
-
-def _tau(topology: Topology, weights: FloatArray, held: int | IntArray) -> LogDet:
-    solver = LogDetSolver(topology.edges, topology.num_nodes, held)
-    return solver.log_det(laplacian_form(topology.edges, weights))
+    tau_p = solver.log_det(laplacian_form(topology.edges, w_p))
+    return float(k) * tau_p + float(q) * solver.log_det(laplacian_form(topology.edges, w_r))
