@@ -7,6 +7,7 @@ import numpy as np
 from topobelief.arrays import FloatArray
 from topobelief.geometry.group import Group
 
+_UNIT_TOLERANCE = 4 * float(np.finfo(np.float64).eps)
 _SMALL_ANGLE = 1e-3  # below it two terms of the series used here are exact to a few units of roundoff
 
 
@@ -97,8 +98,9 @@ def _rotate(q: FloatArray, vector: FloatArray) -> FloatArray:
 
 
 def _canonical(q: FloatArray) -> FloatArray:
-    """Unit norm, w >= 0: the quaternion of a rotation by at most pi."""
-    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    """Unit norm, w >= 0: the quaternion of a rotation by at most pi; one of unit norm already keeps every digit."""
+    norm = np.linalg.norm(q, axis=-1, keepdims=True)
+    q = np.where(np.abs(norm - 1) <= _UNIT_TOLERANCE, q, q / norm)
     return np.where(q[..., 3:] < 0, -q, q)
 
 
