@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from topobelief.arrays import FloatArray, frozen_floats
+from topobelief.arrays import FloatArray, IntArray, frozen_floats, frozen_ints
 from topobelief.errors import InvalidInputError
 
 SCHEMA = "topobelief.decision/1"
@@ -40,7 +40,7 @@ class Decision:
     ----------
     best : int
         The chosen action: the first of the ranking, or the one of least J once evaluated.
-    ranking : tuple of int
+    ranking : shape (K,), int
         All K actions, best signature first (signature - cost for spanning trees); ties by index.
     signatures : shape (K,)
         Raw signatures.
@@ -49,7 +49,7 @@ class Decision:
         value widened by its error. nan where not computed.
     entropies : shape (K,)
         Exact objective, cost excluded; nan where not evaluated.
-    survivors : tuple of int
+    survivors : shape (number of survivors,), int
         Actions that may still be optimal, in ranking order; the first of the ranking is always among them.
     error_bound : float
         No action is better than the best by more than this, nats; inf where no bounds were asked for.
@@ -64,12 +64,12 @@ class Decision:
     """
 
     best: int
-    ranking: tuple[int, ...]
+    ranking: IntArray
     signatures: FloatArray
     lower: FloatArray
     upper: FloatArray
     entropies: FloatArray
-    survivors: tuple[int, ...]
+    survivors: IntArray
     error_bound: float
     margin_met: bool | None
     num_evaluations: int
@@ -83,6 +83,8 @@ class Decision:
     def __post_init__(self) -> None:
         for name in ("signatures", "lower", "upper", "entropies"):
             object.__setattr__(self, name, frozen_floats(getattr(self, name), name=name))
+        for name in ("ranking", "survivors"):
+            object.__setattr__(self, name, frozen_ints(getattr(self, name), name=name))
 
     @property
     def num_actions(self) -> int:
@@ -128,9 +130,9 @@ class Decision:
 
     def __str__(self) -> str:
         header = ("rank", "action", "signature", "lower", "upper", "exact", "poses", "closures", "length", "survives")
-        surviving = set(self.survivors)
+        surviving = set(self.survivors.tolist())
         rows: list[tuple[str, ...]] = [header]
-        for rank, action in enumerate(self.ranking, start=1):
+        for rank, action in enumerate(self.ranking.tolist(), start=1):
             c = self.candidates[action]
             numbers = (self.signatures[action], self.lower[action], self.upper[action], self.entropies[action])
             rows.append(
@@ -161,8 +163,8 @@ class Decision:
             "margin_met": self.margin_met,
             "num_evaluations": self.num_evaluations,
             "proven_optimal": self.proven_optimal,
-            "ranking": list(self.ranking),
-            "survivors": list(self.survivors),
+            "ranking": self.ranking.tolist(),
+            "survivors": self.survivors.tolist(),
             "actions": [
                 {
                     "label": candidate.label,
@@ -206,8 +208,8 @@ class Decision:
             )
             return cls(
                 best=data["best"],
-                ranking=tuple(data["ranking"]),
-                survivors=tuple(data["survivors"]),
+                ranking=np.array(data["ranking"], dtype=np.int64),
+                survivors=np.array(data["survivors"], dtype=np.int64),
                 error_bound=float(data["error_bound"]),
                 margin_met=data["margin_met"],
                 num_evaluations=data["num_evaluations"],

@@ -148,12 +148,12 @@ class Search:
         session = self._evaluation
         return Decision(
             best=best,
-            ranking=tuple(self._ranking),
+            ranking=np.array(self._ranking),
             signatures=self._signatures,
             lower=self._lower,
             upper=self._upper,
             entropies=self._entropies,
-            survivors=tuple(survivors),
+            survivors=np.array(survivors),
             error_bound=error_bound,
             margin_met=margin_met,
             num_evaluations=int(np.count_nonzero(~np.isnan(self._entropies))),
