@@ -132,7 +132,8 @@ class Decision:
         header = ("rank", "action", "signature", "lower", "upper", "exact", "poses", "closures", "length", "survives")
         surviving = set(self.survivors.tolist())
         rows: list[tuple[str, ...]] = [header]
-        for rank, action in enumerate(self.ranking.tolist(), start=1):
+        ranking: list[int] = self.ranking.tolist()
+        for rank, action in enumerate(ranking, start=1):
             c = self.candidates[action]
             numbers = (self.signatures[action], self.lower[action], self.upper[action], self.entropies[action])
             rows.append(
