@@ -1,6 +1,6 @@
 """Exact joint entropy of a pose graph, with an estimate of its rounding error.
 
-    J = (n - 1) kappa / 2 ln(2 pi e) - 1/2 ln det I        (Kitanov and Indelman, arXiv 1903.00927, eq. 10)
+    J = (n - 1) kappa / 2 ln(2 pi e) - 1/2 ln det I        (Kitanov and Indelman, arXiv 1903.00927, eq. 14)
 
 I is the Fisher information at the poses as they stand, each measurement taken as the one that they predict, with one pose
 anchored (its block removed). ln det I is the same whatever pose is anchored; rounding is not, so the pose with the strongest

@@ -1,4 +1,4 @@
-"""The paper's bounds of ln det I (Kitanov and Indelman, arXiv 1903.00927, eqs. 9, 12 to 17), after Khosoussi et al.
+"""The paper's bounds of ln det I (Kitanov and Indelman, arXiv 1903.00927, eqs. 11, 16 to 21), after Khosoussi et al.
 
 With one noise diag(w_p I_k, w_r I_q) on all edges, xi^2 = w_p / w_r and Psi = xi^2 max_i of the squared lengths of the
 edges that leave i, in SE(2) and, with q for 1, in SE(3):

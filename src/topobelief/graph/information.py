@@ -1,6 +1,6 @@
 """Information matrices of edges: checked, and described by what the theory asks of them.
 
-Notation (THEORY of the docs, sections 3 to 5): Omega = [[O_pp, O_pr], [O_rp, O_rr]] on the tangent
+Notation (docs, the mathematics, sections 3 to 5): Omega = [[O_pp, O_pr], [O_rp, O_rr]] on the tangent
 (translation, rotation); k and q the dimensions of positions and rotations;
 O_r|p = O_rr - O_rp O_pp^-1 O_pr the rotation's information once the position is given away.
 """

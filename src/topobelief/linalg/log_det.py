@@ -35,6 +35,7 @@ _PROBE_SAFETY = 2.0  # eight probes underestimate one variance by more than this
 _CONFIDENCE = 4.0  # standard deviations of the rounding error that the estimate covers
 _QR_SIZE = 1200  # up to here a dense QR takes a fraction of a second
 _QR_RELATIVE_ERROR = 1e-8  # beyond it the QR is worth its time
+_HOLD_STRONGEST_ERROR = 1e-6  # nats; below it one more factorisation would not be seen
 _ASSEMBLY_OPERATIONS = 16  # roundings behind one term of a block
 
 
@@ -95,6 +96,17 @@ class LogDetSolver:
         if result.error > _QR_RELATIVE_ERROR * max(1.0, abs(result.value)) and pattern.size <= _QR_SIZE:
             result = min(result, _by_qr(form, pattern, shift), key=lambda candidate: candidate.error)
         return form.multiplicity * result
+
+    def gauge_free_log_det(self, form: EdgeForm) -> LogDet:
+        """ln det of a form for which it does not matter which one node is held (docs, the mathematics, section 4).
+
+        Where rounding matters, the node with the strongest rows is held instead of the solver's.
+        """
+        here = self.log_det(form)
+        if here.error <= _HOLD_STRONGEST_ERROR:
+            return here
+        elsewhere = LogDetSolver(self._edges, len(self._free), form.strongest_node()).log_det(form)
+        return min(here, elsewhere, key=lambda candidate: candidate.error)
 
     def hadamard(self, form: EdgeForm, *, shift: float = 0.0) -> LogDet:
         """Sum of ln det of the diagonal blocks, an upper bound of `log_det` (Hadamard and Fischer)."""

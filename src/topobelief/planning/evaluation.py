@@ -17,6 +17,7 @@ from topobelief.graph.action import Action, posterior
 from topobelief.graph.fisher import FisherRows, fisher_rows
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg import LogDet, LogDetSolver
+from topobelief.linalg.log_det import UNIT_ROUNDOFF
 from topobelief.planning.objectives import ObjectiveName, PosteriorSize, objective_value
 from topobelief.signatures.spanning_trees import map_signature_estimate, spanning_tree_estimate
 from topobelief.signatures.von_neumann import von_neumann_entropy, von_neumann_entropy_approx
@@ -69,9 +70,10 @@ class PosteriorEvaluation:
         """The raw signature; for spanning trees the one that belongs to the objective."""
         topology, information = self._posterior.topology, self._posterior.information
         if name == "von_neumann":
-            return LogDet(von_neumann_entropy(topology), 0.0)
+            return _rounded(von_neumann_entropy(topology), topology.num_nodes)
         if name == "von_neumann_approx":
-            return LogDet(von_neumann_entropy_approx(topology, information=information if normalized else None), 0.0)
+            value = von_neumann_entropy_approx(topology, information=information if normalized else None)
+            return _rounded(value, topology.num_nodes)
         if objective == "map":
             existing = np.arange(self._prior.num_poses)
             new_solver = LogDetSolver(topology.edges, topology.num_nodes, existing)
@@ -129,10 +131,10 @@ class ActionEvaluation:
     session: ScratchEvaluation
     posterior: PosteriorEvaluation
 
-    def signature(self) -> float:
-        """Raw signature; the larger, the better."""
+    def signature(self) -> LogDet:
+        """Raw signature with its rounding error; the larger, the better."""
         session = self.session
-        return self.posterior.signature(session.signature, session.objective, normalized=session.normalized).value
+        return self.posterior.signature(session.signature, session.objective, normalized=session.normalized)
 
     def bounds(self) -> tuple[float, float]:
         """LB and UB of the objective, cost excluded, widened by their rounding errors."""
@@ -143,3 +145,8 @@ class ActionEvaluation:
     def entropy(self) -> LogDet:
         """The exact objective, cost excluded, with its rounding error."""
         return self.posterior.entropy(self.session.objective)
+
+
+def _rounded(value: float, num_terms: int) -> LogDet:
+    """A sum of `num_terms` terms of one sign, with its rounding error."""
+    return LogDet(value, UNIT_ROUNDOFF * num_terms * max(1.0, abs(value)))

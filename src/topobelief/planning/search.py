@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from topobelief.arrays import FloatArray
 from topobelief.graph.action import Action
 from topobelief.planning.decision import Candidate, Decision
 from topobelief.planning.evaluation import ScratchEvaluation
@@ -57,15 +58,18 @@ class Search:
 
     def rank(self, *, bounds_too: bool) -> None:
         """Signatures of all actions and their order; bounds in the same pass if wanted, while the posterior is at hand."""
+        rounding = 0.0
         for index, action in enumerate(self._actions):
             evaluation = self._evaluation.of(action)
-            self._signatures[index] = evaluation.signature()
+            signature = evaluation.signature()
+            self._signatures[index] = signature.value
+            rounding = max(rounding, signature.error)
             if bounds_too:
                 self._set_bounds(index, evaluation.bounds())
             self._clock.report("signatures", index + 1, len(self._actions))
         in_nats = self._evaluation.signature == "spanning_trees"
         score = self._signatures - self._costs if in_nats else self._signatures
-        self._ranking = [int(index) for index in np.argsort(-score, kind="stable")]
+        self._ranking = _descending(score, tolerance=2 * rounding)
 
     def bound_all(self) -> None:
         """Bounds of all actions, along the ranking, until the deadline."""
@@ -171,3 +175,10 @@ class Search:
         path = np.concatenate([graph.positions[-1:], action.poses[:, :k]]) if action.num_new_poses else np.zeros((1, k))
         length = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
         return Candidate(action.label, action.num_new_poses, action.num_closures, length, action.cost)
+
+
+def _descending(scores: FloatArray, *, tolerance: float) -> list[int]:
+    """Indices by descending score; runs of scores that rounding cannot tell apart are ties, ordered by index."""
+    order = np.argsort(-scores, kind="stable")
+    runs = np.cumsum(np.diff(scores[order], prepend=scores[order[:1]]) < -tolerance)
+    return [int(index) for index in order[np.lexsort((order, runs))]]

@@ -1,4 +1,4 @@
-"""The spanning-tree signature s_ST (Kitanov and Indelman, arXiv 1903.00927, eq. 6).
+"""The spanning-tree signature s_ST (Kitanov and Indelman, arXiv 1903.00927, eq. 8).
 
 Notation: t(G) the (weighted) number of spanning trees, tau = ln t(G) = ln det L_tilde (matrix-tree theorem); k and q the
 dimensions of positions and rotations, kappa = k + q; w_p = |O_pp|^(1/k) and w_r = |O_r|p|^(1/q) an edge's noise as two weights.
@@ -56,7 +56,7 @@ def log_num_spanning_trees(topology: Topology, *, weights: ArrayLike | None = No
 def spanning_tree_signature(topology: Topology, information: ArrayLike) -> float:
     """s_ST, nats; the larger, the better known the poses.
 
-    With one Omega, kappa/2 tau + (n - 1)/2 [ln |Omega| - kappa ln(2 pi e)] (the paper's eq. 6 with its n corrected); with any
+    With one Omega, kappa/2 tau + (n - 1)/2 [ln |Omega| - kappa ln(2 pi e)] (the paper's eq. 8 with its n corrected); with any
     noise, 1/2 [k tau_p + q tau_r] - (n - 1) kappa/2 ln(2 pi e) on the weights w_p and w_r, which is the same for one Omega and
     -J on a tree.
 

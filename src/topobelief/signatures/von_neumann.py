@@ -1,4 +1,4 @@
-"""Von Neumann entropy of a graph, by spectrum and by degrees (Kitanov and Indelman, arXiv 1903.00927, eqs. 4, 5).
+"""Von Neumann entropy of a graph, by spectrum and by degrees (Kitanov and Indelman, arXiv 1903.00927, eqs. 6, 7).
 
 Notation: L_hat the normalised Laplacian of the simple graph (parallel edges collapse), lambda_hat its eigenvalues, d(i) node
 degrees.

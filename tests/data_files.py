@@ -1,0 +1,26 @@
+"""Where tests find real pose graphs and floor plans, which the project does not ship."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+_BESIDE_CHECKOUT = Path(__file__).resolve().parents[2] / "shared"
+
+
+def data_file(name: str) -> Path:
+    """A pose graph from $TOPOBELIEF_DATA, or from shared/data beside the checkout; skips where it is absent."""
+    return _file_or_skip(Path(os.environ.get("TOPOBELIEF_DATA", _BESIDE_CHECKOUT / "data")) / name)
+
+
+def map_file(name: str) -> Path:
+    """A floor plan from $TOPOBELIEF_MAPS, or from shared/maps beside the checkout; skips where it is absent."""
+    return _file_or_skip(Path(os.environ.get("TOPOBELIEF_MAPS", _BESIDE_CHECKOUT / "maps")) / name)
+
+
+def _file_or_skip(path: Path) -> Path:
+    if not path.exists():
+        pytest.skip(f"{path.name} is not at hand: set TOPOBELIEF_DATA or TOPOBELIEF_MAPS to its folder")
+    return path
