@@ -1,0 +1,1 @@
+"""Files in and out: pose graphs (g2o, TORO), floor plans, and the conversion to GTSAM; a format a file."""

@@ -1,0 +1,121 @@
+"""Conversion to GTSAM and back: the same factors, with its order of the tangent."""
+
+from __future__ import annotations
+
+import gtsam
+import numpy as np
+import pytest
+from hypothesis import given
+
+from graphs import SE2_GROUP, SE3_GROUP, pose_graphs
+from topobelief.errors import InvalidInputError
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.io.gtsam import from_gtsam, to_gtsam
+
+UNIT = gtsam.noiseModel.Unit.Create(3)
+
+
+@given(graph=pose_graphs())
+def test_there_and_back_is_the_same_graph(graph: PoseGraph):
+    """Ids, poses, edges, measurements and information survive, up to the roundings of GTSAM's noise models."""
+    named = PoseGraph(graph.poses, graph.edges, graph.measurements, graph.information, ids=7 + 10 * np.arange(graph.num_poses))
+    back = from_gtsam(*to_gtsam(named))
+    assert np.array_equal(back.ids, named.ids)
+    assert np.array_equal(back.edges, named.edges)
+    scale = max(1.0, np.abs(named.positions).max())
+    np.testing.assert_allclose(back.poses, named.poses, atol=1e-12 * scale)
+    root = np.sqrt(np.diagonal(named.information, axis1=1, axis2=2))
+    assert (np.abs(back.information - named.information) <= 1e-9 * root[:, :, None] * root[:, None, :]).all()
+
+
+@pytest.mark.parametrize("group", [SE2_GROUP, SE3_GROUP])
+def test_a_factor_weighs_each_direction_as_the_edge_does(group):
+    """GTSAM's error of a factor is half of chi^2, direction by direction, for any information.
+
+    Where the rotation is the measured one, both take the same residual; where the position is, both see a pure rotation.
+    """
+    rng = np.random.default_rng(3)
+    kappa, k = group.tangent_dim, group.position_dim
+    root = rng.normal(size=(kappa, kappa))
+    information = root.T @ root + np.eye(kappa)
+    measured = group.exp(rng.normal(size=kappa))
+    for direction in range(kappa):
+        tangent = np.zeros(kappa)
+        tangent[direction] = 0.3
+        poses = np.stack([group.identity(), group.compose(measured, group.exp(tangent))])
+        graph = PoseGraph(poses, [(0, 1)], measured[None], information)
+        factors, values = to_gtsam(graph)
+        assert graph.chi2 == pytest.approx(information[direction, direction] * 0.09, rel=1e-12)
+        assert 2 * factors.error(values) == pytest.approx(graph.chi2, rel=1e-9)
+    assert k < kappa
+
+
+def test_one_prior_says_where_and_is_left_out():
+    factors, values = to_gtsam(PoseGraph([[0, 0, 0], [1, 0, 0]], [(0, 1)], None, np.diag([1.0, 2.0, 3.0])))
+    factors.add(gtsam.PriorFactorPose2(0, gtsam.Pose2(), UNIT))
+    assert from_gtsam(factors, values).num_edges == 1
+    factors.add(gtsam.PriorFactorPose2(1, gtsam.Pose2(), UNIT))
+    with pytest.raises(InvalidInputError, match="at most one prior, got PriorFactorPose2 as factor 2"):
+        from_gtsam(factors, values)
+
+
+def test_symbols_become_ids():
+    values = gtsam.Values()
+    values.insert(gtsam.symbol("x", 4), gtsam.Pose2(1, 2, 0.5))
+    graph = from_gtsam(gtsam.NonlinearFactorGraph(), values)
+    assert graph.ids.tolist() == [gtsam.symbol("x", 4)]
+    assert graph.poses.tolist() == [[1, 2, 0.5]]
+
+
+def _graph_with(*factors: object) -> gtsam.NonlinearFactorGraph:
+    graph = gtsam.NonlinearFactorGraph()
+    for factor in factors:
+        graph.add(factor)
+    return graph
+
+
+def _planar_values() -> gtsam.Values:
+    values = gtsam.Values()
+    values.insert(0, gtsam.Pose2())
+    values.insert(1, gtsam.Pose2(1, 0, 0))
+    return values
+
+
+HUBER = gtsam.noiseModel.Robust.Create(gtsam.noiseModel.mEstimator.Huber.Create(1.0), UNIT)
+BAD_FACTORS = {
+    "range": (
+        gtsam.RangeFactorPose2(0, 1, 1.0, gtsam.noiseModel.Unit.Create(1)),
+        "got RangeFactorPose2 as factor 0",
+    ),
+    "robust": (gtsam.BetweenFactorPose2(0, 1, gtsam.Pose2(), HUBER), "expected Gaussian noise, got Robust on factor 0"),
+    "constrained": (
+        gtsam.BetweenFactorPose2(0, 1, gtsam.Pose2(), gtsam.noiseModel.Constrained.All(3)),
+        "expected Gaussian noise, got Constrained on factor 0",
+    ),
+    "no value": (gtsam.BetweenFactorPose2(0, 9, gtsam.Pose2(), UNIT), "got none for 9 of factor 0"),
+    "mixed": (
+        gtsam.BetweenFactorPose3(0, 1, gtsam.Pose3(), gtsam.noiseModel.Unit.Create(6)),
+        "got both Pose2 and Pose3",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD_FACTORS)
+def test_what_is_no_pose_graph_is_refused(case: str):
+    factor, message = BAD_FACTORS[case]
+    with pytest.raises(InvalidInputError, match=message):
+        from_gtsam(_graph_with(factor), _planar_values())
+
+
+def test_values_that_are_no_poses_are_refused():
+    values = gtsam.Values()
+    values.insert(3, np.zeros(2))
+    with pytest.raises(InvalidInputError, match="expected values of type Pose2 or Pose3, got another at 3"):
+        from_gtsam(gtsam.NonlinearFactorGraph(), values)
+    with pytest.raises(InvalidInputError, match="expected at least one value, got none"):
+        from_gtsam(gtsam.NonlinearFactorGraph(), gtsam.Values())
+
+
+def test_negative_ids_are_no_keys():
+    with pytest.raises(InvalidInputError, match="expected ids from 0 as GTSAM keys, got -1"):
+        to_gtsam(PoseGraph([[0, 0, 0]], [], None, np.eye(3), ids=[-1]))
