@@ -16,9 +16,8 @@ import numpy as np
 
 from topobelief.errors import InvalidGraphError
 from topobelief.graph.fisher import FisherRows
+from topobelief.graph.information import SAME_NOISE
 from topobelief.linalg import LogDet, LogDetSolver, laplacian_form
-
-_EQUAL_NOISE_TOLERANCE = 1e-12
 
 
 def paper_bounds(rows: FisherRows, solver: LogDetSolver, *, hadamard: bool) -> tuple[LogDet, LogDet]:
@@ -74,7 +73,7 @@ def require_equal_noise(rows: FisherRows) -> tuple[float, float]:
         )
     w_p, w_r = rows.weights
     for name, w in (("position", w_p), ("rotation", w_r)):
-        different = np.flatnonzero(np.abs(w - w[0]) > _EQUAL_NOISE_TOLERANCE * w[0])
+        different = np.flatnonzero(np.abs(w - w[0]) > SAME_NOISE * w[0])
         if different.size:
             raise InvalidGraphError(
                 f"the paper's bounds expect the same noise on all edges, got {name} information {w[0]:.6g} at edge 0 and "

@@ -62,7 +62,7 @@ class Action:
             tangent_dim = raw_information.shape[-1] if raw_information.ndim >= 2 else 0
             raw_poses = frozen_floats(poses, name="poses")
             size = {3: 3, 6: 7}.get(tangent_dim)
-            if raw_poses.size and raw_poses.ndim == 2:
+            if raw_poses.ndim == 2 and raw_poses.shape[1] in (3, 7):
                 size = int(raw_poses.shape[1])
             checked_poses, group = checked_pose_rows(raw_poses, name="poses", size=size or 3)
             checked_edges = frozen_ints(edges, name="edges")
@@ -107,7 +107,7 @@ def check_action(graph: PoseGraph, action: Action, *, index: int | None = None) 
         Names the action (by `index`) and the edge.
     """
     label = action.label
-    if action.information.shape[-1] != graph.tangent_dim:
+    if len(action.edges) and action.information.shape[-1] != graph.tangent_dim:
         raise InvalidActionError(
             f"expected information matrices of size {graph.tangent_dim} for a graph in {graph.group.name}, "
             f"got {action.information.shape[-1]}",
@@ -189,6 +189,8 @@ def posterior(graph: PoseGraph, action: Action) -> PoseGraph:
         Where the action does not fit the graph.
     """
     check_action(graph, action)
+    if len(action.edges) == 0:  # then there are no new poses either
+        return graph
     poses = np.concatenate([graph.poses, action.poses]) if action.num_new_poses else graph.poses
     i, j = action.edges.T
     predicted = graph.group.between(poses[i], poses[j])

@@ -19,7 +19,7 @@ import numpy as np
 
 from topobelief.arrays import FloatArray, IntArray
 from topobelief.geometry import Group
-from topobelief.graph.information import isotropic_weights
+from topobelief.graph.information import SAME_NOISE, isotropic_weights
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg.edge_form import EdgeForm, laplacian_form
 from topobelief.linalg.log_det import UNIT_ROUNDOFF
@@ -101,7 +101,7 @@ class FisherRows:
         if self.weights is None or len(self.edges) == 0:
             return None
         ratios = self.weights[1] / self.weights[0]
-        return float(ratios[0]) if np.ptp(ratios) <= UNIT_ROUNDOFF * ratios[0] else None
+        return float(ratios[0]) if np.ptp(ratios) <= SAME_NOISE * ratios[0] else None
 
     def squared_lengths(self) -> FloatArray:
         """|d|^2, shape (m,): |C(d)|^2 counts it once in SE(2) and twice in SE(3)."""

@@ -15,7 +15,7 @@ from topobelief.errors import InvalidGraphError
 
 _SPLITS = {3: (2, 1), 6: (3, 3)}
 _SYMMETRY_TOLERANCE = 1e-9
-_ISOTROPY_TOLERANCE = 1e-12
+SAME_NOISE = 4 * float(np.finfo(np.float64).eps)  # relative; information closer than this is one and the same
 
 
 def tangent_split(tangent_dim: int) -> tuple[int, int]:
@@ -82,7 +82,7 @@ def shared_information(information: FloatArray) -> FloatArray | None:
     if len(information) == 0:
         return None
     first = information[0]
-    same = np.allclose(information, first, rtol=_ISOTROPY_TOLERANCE, atol=0) if information.strides[0] else True
+    same = np.allclose(information, first, rtol=SAME_NOISE, atol=0) if information.strides[0] else True
     return first if same else None
 
 
@@ -97,7 +97,7 @@ def isotropic_weights(information: FloatArray) -> tuple[FloatArray, FloatArray] 
     expected = w_p[:, None, None] * block + w_r[:, None, None] * rotation
     scale = np.sqrt(np.diagonal(information, axis1=1, axis2=2))
     deviation = np.abs(information - expected) / (scale[:, :, None] * scale[:, None, :])
-    if deviation.max(initial=0.0) > _ISOTROPY_TOLERANCE:
+    if deviation.max(initial=0.0) > SAME_NOISE:
         return None
     return w_p, w_r
 

@@ -116,7 +116,10 @@ def from_gtsam(factors: Any, values: Any) -> PoseGraph:
 
 def _gtsam() -> Any:
     """GTSAM, whose bindings carry no usable types; loaded when first used."""
-    return importlib.import_module("gtsam")
+    try:
+        return importlib.import_module("gtsam")
+    except ModuleNotFoundError:
+        raise InvalidInputError("expected GTSAM to be installed, got none; run pip install 'topobelief[gtsam]'") from None
 
 
 def _to_pose(gtsam: Any, pose: list[float]) -> Any:

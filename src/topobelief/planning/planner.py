@@ -23,7 +23,7 @@ from topobelief.bounds.paper import require_equal_noise
 from topobelief.errors import InvalidActionError, InvalidInputError, require_choice
 from topobelief.graph.action import Action, check_actions
 from topobelief.graph.fisher import fisher_rows
-from topobelief.graph.information import shared_information
+from topobelief.graph.information import SAME_NOISE, shared_information
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.graph.topology import checked_anchor
 from topobelief.planning.decision import Decision
@@ -198,7 +198,7 @@ class Planner:
         if expected is None:  # a graph without edges
             return
         for index, action in enumerate(actions):
-            same = np.isclose(action.information, expected, atol=0).all(axis=(1, 2))
+            same = np.isclose(action.information, expected, rtol=SAME_NOISE, atol=0).all(axis=(1, 2))
             for edge in np.flatnonzero(~same)[:1]:
                 raise InvalidActionError(
                     "the paper's bounds expect the graph's information matrix on all edges, got another one; "
