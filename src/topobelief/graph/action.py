@@ -70,7 +70,10 @@ class Action:
                 checked_edges = checked_edges.reshape(0, 2)
             if checked_edges.ndim != 2 or checked_edges.shape[1] != 2:
                 raise InvalidInputError(f"expected edges of shape (c, 2), got {checked_edges.shape}")
-            checked = checked_information(raw_information, num_edges=len(checked_edges), tangent_dim=group.tangent_dim)
+            if size is None and len(checked_edges) == 0:  # nothing says which group: the action fits both
+                checked = np.zeros((0, 0, 0))
+            else:
+                checked = checked_information(raw_information, num_edges=len(checked_edges), tangent_dim=group.tangent_dim)
         except InvalidInputError as error:
             raise InvalidActionError(str(error), label=label) from None
         negative = np.flatnonzero((checked_edges < 0).any(axis=1))
@@ -107,7 +110,7 @@ def check_action(graph: PoseGraph, action: Action, *, index: int | None = None) 
         Names the action (by `index`) and the edge.
     """
     label = action.label
-    if len(action.edges) and action.information.shape[-1] != graph.tangent_dim:
+    if action.information.shape[-1] not in (0, graph.tangent_dim):
         raise InvalidActionError(
             f"expected information matrices of size {graph.tangent_dim} for a graph in {graph.group.name}, "
             f"got {action.information.shape[-1]}",
