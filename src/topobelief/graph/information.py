@@ -32,7 +32,7 @@ def tangent_split(tangent_dim: int) -> tuple[int, int]:
 
 
 def checked_information(information: ArrayLike, *, num_edges: int, tangent_dim: int) -> FloatArray:
-    """Information matrices of shape (num_edges, kappa, kappa), read-only; one matrix is shared by all edges.
+    """Information matrices of shape (num_edges, kappa, kappa), read-only, exactly symmetric; one is shared by all edges.
 
     Raises
     ------
@@ -42,10 +42,9 @@ def checked_information(information: ArrayLike, *, num_edges: int, tangent_dim: 
     array = frozen_floats(information, name="information")
     shape = (num_edges, tangent_dim, tangent_dim)
     if array.ndim == 2 and array.shape == shape[1:]:
-        array = np.broadcast_to(array, shape)
         if num_edges:
-            _require_positive_definite(array[:1])
-        return array
+            _require_positive_definite(array[None])
+        return np.broadcast_to(_symmetric(array), shape)
     if array.size == 0 and num_edges == 0:
         return np.broadcast_to(np.eye(tangent_dim), shape)
     if array.shape != shape:
@@ -53,7 +52,17 @@ def checked_information(information: ArrayLike, *, num_edges: int, tangent_dim: 
             f"expected information of shape {shape} or {shape[1:]} (one matrix for all edges), got {array.shape}"
         )
     _require_positive_definite(array)
-    return array
+    return _symmetric(array)
+
+
+def _symmetric(matrices: FloatArray) -> FloatArray:
+    """The mean of each matrix and its transpose, where they differ in the last digits."""
+    transposed = np.swapaxes(matrices, -1, -2)
+    if np.array_equal(matrices, transposed):
+        return matrices
+    mean = (matrices + transposed) / 2
+    mean.flags.writeable = False
+    return mean
 
 
 def _require_positive_definite(information: FloatArray) -> None:

@@ -77,6 +77,8 @@ class PoseGraph:
         if len(checked_poses) == 0:
             raise InvalidGraphError("expected at least one pose, got none")
         topology = Topology(len(checked_poses), edges)
+        if kinds is not None and np.shape(kinds) != (len(checked_poses),):
+            raise InvalidGraphError(f"expected a kind per pose, shape ({len(checked_poses)},), got {np.shape(kinds)}")
         if kinds is not None and not (np.asarray(kinds) == "pose").all():
             raise InvalidGraphError('expected every kind to be "pose"; landmarks are not supported')
         if measurements is None:
@@ -87,7 +89,7 @@ class PoseGraph:
             checked_measurements, _ = checked_pose_rows(
                 measurements, name="measurements", size=group.pose_size, count=topology.num_edges
             )
-        checked_ids = np.arange(len(checked_poses)) if ids is None else frozen_ints(ids, name="ids")
+        checked_ids = frozen_ints(np.arange(len(checked_poses)) if ids is None else ids, name="ids")
         if checked_ids.shape != (len(checked_poses),) or len(np.unique(checked_ids)) != len(checked_ids):
             raise InvalidGraphError(f"expected {len(checked_poses)} different ids, got shape {checked_ids.shape}")
         for index in fixed:

@@ -50,6 +50,8 @@ class Topology:
             checked = checked.reshape(0, 2)
         if checked.ndim != 2 or checked.shape[1] != 2:
             raise InvalidGraphError(f"expected edges of shape (num_edges, 2), got {checked.shape}")
+        if not isinstance(num_nodes, (int, np.integer)):  # pyright: ignore[reportUnnecessaryIsInstance]  (untyped callers)
+            raise InvalidGraphError(f"expected a whole number of nodes, got {num_nodes}")
         if num_nodes < 1:
             raise InvalidGraphError(f"expected at least one node, got {num_nodes}")
         bad = np.flatnonzero((checked < 0).any(axis=1) | (checked >= num_nodes).any(axis=1))
