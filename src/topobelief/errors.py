@@ -86,11 +86,14 @@ class IllConditionedError(TopobeliefError, ArithmeticError):
 
     Attributes
     ----------
+    what : str
+        What was asked for.
     error_estimate : float
         Estimated absolute error of what was asked for, nats (inf where the factorisation broke down).
     """
 
     def __init__(self, what: str, error_estimate: float) -> None:
+        self.what = what
         self.error_estimate = error_estimate
         super().__init__(
             f"{what}: the graph is too ill-conditioned for double precision (estimated error {error_estimate:.1e} nats); "

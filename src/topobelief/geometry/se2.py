@@ -13,7 +13,8 @@ _SMALL_ANGLE = 1e-4  # below it the series of sin(t)/t and (1 - cos t)/t are exa
 def wrap_angle(angle: FloatArray) -> FloatArray:
     """The same angle in [-pi, pi); angles that lie there already keep every digit."""
     inside = (angle >= -np.pi) & (angle < np.pi)
-    return np.where(inside, angle, (angle + np.pi) % (2 * np.pi) - np.pi)
+    wrapped = (angle + np.pi) % (2 * np.pi) - np.pi
+    return np.where(inside, angle, np.where(wrapped < np.pi, wrapped, -np.pi))
 
 
 class SE2(Group):

@@ -88,7 +88,7 @@ class BlockPattern:
         """Diagonal blocks of the form's matrix, shape (num_free, b, b)."""
         ends = np.concatenate([form.rows_i, form.rows_j])
         b = self.block_size
-        return (self.diagonal_sum @ (ends.transpose(0, 2, 1) @ ends).reshape(-1, b * b)).reshape(-1, b, b)
+        return (self.diagonal_sum @ (ends.transpose(0, 2, 1) @ ends).reshape(-1, b * b)).reshape(self.size // b, b, b)
 
     def magnitude(self, form: EdgeForm) -> FloatArray:
         """Sum of squared term sizes behind each diagonal entry, shape (size,)."""
@@ -107,7 +107,7 @@ class BlockPattern:
         array, shape (size, c)
         """
         pulled = np.concatenate([form.rows_i.transpose(0, 2, 1) @ values, form.rows_j.transpose(0, 2, 1) @ values])
-        return (self.diagonal_sum @ pulled.reshape(len(pulled), -1)).reshape(self.size, -1)
+        return (self.diagonal_sum @ pulled.reshape(len(pulled), -1)).reshape(self.size, values.shape[2])
 
     def dense_rows(self, form: EdgeForm) -> FloatArray:
         """All rows on all free variables, dense, shape (m r, size)."""

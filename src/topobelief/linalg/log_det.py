@@ -24,8 +24,12 @@ import qdldl
 from scipy import linalg, sparse
 
 from topobelief.arrays import BoolArray, FloatArray, IntArray
+from topobelief.errors import IllConditionedError
 from topobelief.linalg.block_pattern import BlockPattern
 from topobelief.linalg.edge_form import EdgeForm
+
+MAX_ERROR_NATS = 0.1
+"""An entropy or a signature that is not known to this is refused: it could not rank candidates."""
 
 _QDLDL: Any = qdldl  # ships no types
 UNIT_ROUNDOFF = float(np.finfo(np.float64).eps) / 2
@@ -45,6 +49,18 @@ class LogDet:
 
     value: float
     error: float
+
+    def require_accuracy(self, what: str) -> LogDet:
+        """Itself, if its error is small enough to mean anything.
+
+        Raises
+        ------
+        IllConditionedError
+            If the error exceeds `MAX_ERROR_NATS`; says of `what`.
+        """
+        if not self.error <= MAX_ERROR_NATS:
+            raise IllConditionedError(what, self.error)
+        return self
 
     def __add__(self, other: LogDet) -> LogDet:
         return LogDet(self.value + other.value, self.error + other.error)

@@ -112,12 +112,14 @@ class Decision:
             )
         elif not self.proven_optimal and math.isfinite(self.error_bound):
             sentences.append(
-                f"No candidate can be better by more than {self.error_bound:.3g} nats{unit}; "
-                f"{ruled_out} {'was' if ruled_out == 1 else 'were'} ruled out without evaluating them."
+                f"No candidate can be better by more than {_readable(self.error_bound)} nats{unit}; "
+                f"{ruled_out} {'was' if ruled_out == 1 else 'were'} ruled out by bounds."
             )
         elif self.proven_optimal and total > 1:
-            evaluated = f"{self.num_evaluations} exact evaluations" if self.num_evaluations else "its bounds alone"
-            sentences.append(f"That is proven by {evaluated}: no other of the {total} can be better.")
+            count = self.num_evaluations
+            spared = f"; bounds ruled out the other {total - count}" if 0 < count < total else ""
+            evaluated = f"{count} exact evaluation{'s' if count > 1 else ''}" if count else "bounds alone"
+            sentences.append(f"That is proven by {evaluated}{spared}.")
         return " ".join(sentences)
 
     def _claim(self) -> str:
@@ -191,8 +193,9 @@ class Decision:
         InvalidInputError
             Where the schema is another one or a field is missing.
         """
-        if data.get("schema") != SCHEMA:
-            raise InvalidInputError(f'expected a decision of schema "{SCHEMA}", got {data.get("schema")!r}')
+        schema = data.get("schema") if isinstance(data, Mapping) else data  # pyright: ignore[reportUnnecessaryIsInstance]
+        if schema != SCHEMA:
+            raise InvalidInputError(f'expected a decision of schema "{SCHEMA}", got {schema!r}')
         try:
             actions: Sequence[Mapping[str, Any]] = data["actions"]
             columns = {
@@ -224,6 +227,13 @@ class Decision:
             )
         except KeyError as error:
             raise InvalidInputError(f"expected a decision with the field {error}, got none") from None
+        except (TypeError, ValueError) as error:
+            raise InvalidInputError(f"expected a decision as to_dict writes it, got one with a bad value: {error}") from None
+
+
+def _readable(nats: float) -> str:
+    """Two digits below ten, whole nats above a hundred."""
+    return f"{nats:.0f}" if nats >= 100 else f"{nats:.1f}" if nats >= 1 else f"{nats:.2g}"
 
 
 def _json_number(value: float) -> float | str:

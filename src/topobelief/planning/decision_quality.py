@@ -83,7 +83,16 @@ def decision_quality(entropies: ArrayLike, signatures: ArrayLike) -> DecisionQua
 
 def rank_correlation(a: ArrayLike, b: ArrayLike) -> float:
     """Spearman's rank correlation; nan where an input is constant or has fewer than two values."""
-    return _correlations(np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64))[0]
+    first, second = _mean_ranks(a), _mean_ranks(b)
+    if len(first) < 2 or np.ptp(first) == 0 or np.ptp(second) == 0:
+        return float("nan")
+    return float(np.corrcoef(first, second)[0, 1])
+
+
+def _mean_ranks(values: ArrayLike) -> FloatArray:
+    """Ranks from 1, ties sharing their mean."""
+    _, group, counts = np.unique(np.asarray(values, dtype=np.float64), return_inverse=True, return_counts=True)
+    return (np.cumsum(counts) - (counts - 1) / 2)[group]
 
 
 def _worst_violation(J: FloatArray, s: FloatArray) -> float:
@@ -105,6 +114,5 @@ def _correlations(a: FloatArray, b: FloatArray) -> tuple[float, float, float]:
         return float("nan"), float("nan"), float("nan")
     from scipy import stats  # heavy, and needed only when quality is asked for
 
-    spearman = float(stats.spearmanr(a, b).statistic)
     kendall = float(stats.kendalltau(a, b).statistic)
-    return spearman, kendall, float(np.corrcoef(a, b)[0, 1])
+    return rank_correlation(a, b), kendall, float(np.corrcoef(a, b)[0, 1])

@@ -20,8 +20,8 @@ import numpy as np
 from topobelief.arrays import FloatArray
 from topobelief.bounds.entropy_bounds import Determinant, Family
 from topobelief.bounds.paper import require_equal_noise
-from topobelief.errors import InvalidActionError, InvalidInputError, require_choice
-from topobelief.graph.action import Action, check_actions
+from topobelief.errors import InvalidActionError, InvalidGraphError, InvalidInputError, require_choice
+from topobelief.graph.action import Action, check_actions, posterior
 from topobelief.graph.fisher import fisher_rows
 from topobelief.graph.information import SAME_NOISE, shared_information
 from topobelief.graph.pose_graph import PoseGraph
@@ -29,7 +29,7 @@ from topobelief.graph.topology import checked_anchor
 from topobelief.planning.decision import Decision
 from topobelief.planning.evaluation import ScratchEvaluation, SignatureName
 from topobelief.planning.objectives import ObjectiveName
-from topobelief.planning.search import Clock, Progress, Search
+from topobelief.planning.search import Clock, Progress, Search, naming_action
 from topobelief.signatures.von_neumann import DENSE_SPECTRUM_SIZE, expected_spectrum_seconds
 
 Proof = Literal["none", "bounded", "optimal"]
@@ -188,16 +188,21 @@ class Planner:
         clock = Clock(None, on_progress)
         values = np.empty(len(actions))
         for index, action in enumerate(actions):
-            values[index] = self._evaluation.of(action).entropy().value
+            with naming_action(index, action):
+                values[index] = self._evaluation.of(action).entropy().value
             clock.report("evaluations", index + 1, len(actions))
         return values
 
     def _require_equal_noise(self, actions: Sequence[Action]) -> None:
         """Fail before the work, not in the middle of it, where the paper's family meets other noise."""
         expected = shared_information(self._graph.information)
-        if expected is None:  # a graph without edges
-            return
         for index, action in enumerate(actions):
+            if expected is None:  # a graph without edges
+                try:
+                    require_equal_noise(fisher_rows(posterior(self._graph, action)))
+                except InvalidGraphError as error:
+                    raise InvalidActionError(str(error), action=index, label=action.label) from None
+                continue
             same = np.isclose(action.information, expected, rtol=SAME_NOISE, atol=0).all(axis=(1, 2))
             for edge in np.flatnonzero(~same)[:1]:
                 raise InvalidActionError(

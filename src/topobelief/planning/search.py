@@ -7,17 +7,29 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
 
 import numpy as np
 
 from topobelief.arrays import FloatArray
+from topobelief.errors import IllConditionedError
 from topobelief.graph.action import Action
 from topobelief.planning.decision import Candidate, Decision
 from topobelief.planning.evaluation import ScratchEvaluation
 
 Progress = Callable[[str, int, int], None]
 """Called with a stage ("signatures", "bounds", "evaluations"), how many actions are done, and out of how many."""
+
+
+@contextmanager
+def naming_action(index: int, action: Action) -> Generator[None]:
+    """Put the action's place before what an `IllConditionedError` says."""
+    try:
+        yield
+    except IllConditionedError as error:
+        place = f"action {index}" + (f" ({action.label!r})" if action.label else "")
+        raise IllConditionedError(f"{place}: {error.what}", error.error_estimate) from None
 
 
 class Clock:
@@ -60,12 +72,13 @@ class Search:
         """Signatures of all actions and their order; bounds in the same pass if wanted, while the posterior is at hand."""
         rounding = 0.0
         for index, action in enumerate(self._actions):
-            evaluation = self._evaluation.of(action)
-            signature = evaluation.signature()
-            self._signatures[index] = signature.value
-            rounding = max(rounding, signature.error)
-            if bounds_too:
-                self._set_bounds(index, evaluation.bounds())
+            with naming_action(index, action):
+                evaluation = self._evaluation.of(action)
+                signature = evaluation.signature()
+                self._signatures[index] = signature.value
+                rounding = max(rounding, signature.error)
+                if bounds_too:
+                    self._set_bounds(index, evaluation.bounds())
             self._clock.report("signatures", index + 1, len(self._actions))
         in_nats = self._evaluation.signature == "spanning_trees"
         score = self._signatures - self._costs if in_nats else self._signatures
@@ -89,7 +102,8 @@ class Search:
                 return
             if evaluated and self._lower[index] > self._upper[self._best()]:
                 continue
-            value = self._evaluation.of(self._actions[index]).entropy()
+            with naming_action(index, self._actions[index]):
+                value = self._evaluation.of(self._actions[index]).entropy()
             self._entropies[index] = value.value
             self._set_bounds(index, (value.value - value.error, value.value + value.error))
             evaluated += 1
@@ -127,7 +141,8 @@ class Search:
         return self._decision(best, survivors, error_bound, proven, margin_met=None)
 
     def _bound(self, index: int) -> None:
-        self._set_bounds(index, self._evaluation.of(self._actions[index]).bounds())
+        with naming_action(index, self._actions[index]):
+            self._set_bounds(index, self._evaluation.of(self._actions[index]).bounds())
 
     def _set_bounds(self, index: int, bounds: tuple[float, float]) -> None:
         self._lower[index], self._upper[index] = np.add(bounds, self._costs[index])

@@ -51,7 +51,7 @@ def von_neumann_entropy(topology: Topology) -> float:
     Examples
     --------
     >>> round(von_neumann_entropy(Topology(2, [(0, 1)])), 12)  # eigenvalues 0 and 2: nothing is uncertain
-    -0.0
+    0.0
     """
     n = topology.num_nodes
     if n > DENSE_SPECTRUM_SIZE:
@@ -63,7 +63,7 @@ def von_neumann_entropy(topology: Topology) -> float:
         )
     halves = np.linalg.eigvalsh(normalized_laplacian(topology)) / 2
     positive = halves[halves > n * np.finfo(float).eps]
-    return float(-np.sum(positive * np.log(positive)))
+    return abs(float(np.sum(positive * np.log(positive))))  # each term is negative or zero
 
 
 def expected_spectrum_seconds(num_nodes: int) -> float:

@@ -1,0 +1,217 @@
+"""Homotopy classes of paths as words, and the shortest path of each class on a roadmap.
+
+One ray goes up from a point within each obstacle. A path spells a word: the rays that it crosses, in order, rightward
+crossings as +i and leftward ones as -i; adjacent +i -i cancel. Two paths with the same ends can be deformed into each
+other without passing over an obstacle's point exactly if their reduced words are equal (the rays generate the free
+fundamental group of the punctured plane; used for planning by Grigoriev and Slissenko, 1998, and Bhattacharya et al.,
+"Topological constraints in search-based robot path planning", 2012).
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from topobelief.arrays import FloatArray
+from topobelief.candidates.roadmap import Roadmap
+from topobelief.world import shapes
+
+Point = tuple[float, float]
+Word = tuple[int, ...]  # letters ±1 … ±num_rays
+
+
+@dataclass(frozen=True, eq=False)
+class Rays:
+    """Vertical rays, upward from one point within each obstacle.
+
+    Attributes
+    ----------
+    origins : shape (R, 2)
+    """
+
+    origins: FloatArray
+
+    @classmethod
+    def of_obstacles(cls, roadmap: Roadmap, *, min_size: float = 0.0, max_length: float = math.inf, max_rays: int = 32) -> Rays:
+        """Rays of the obstacles that are worth telling apart.
+
+        Of the holes in the region that the robot's centre can reach (see `World.component`), those that measure at
+        least `min_size` (corner to corner of their extent, metres) and that a path from start to goal of at most
+        `max_length` can get around; and of these the `max_rays` largest.
+        """
+        start, goal = roadmap.vertices[:2]
+        obstacles = shapes.holes(roadmap.region)
+        size, points = shapes.sizes(obstacles), shapes.points_within(obstacles)
+        detour = np.linalg.norm(points - start, axis=1) + np.linalg.norm(points - goal, axis=1)
+        largest_first = np.argsort(-size, kind="stable")
+        worth_it = largest_first[(size >= min_size)[largest_first] & (detour <= max_length)[largest_first]]
+        return cls(points[worth_it[:max_rays]])
+
+    def crossings(self, starts: FloatArray, ends: FloatArray) -> list[Word]:
+        """The letters that each segment spells, in order; shapes (N, 2).
+
+        A point straight above an origin counts as right of it, and rays that coincide as infinitesimally apart, the
+        earlier one to the left, so that no way through a vertex of the roadmap is counted twice or not at all.
+        """
+        x, y = self.origins.T
+        left, right = starts[:, :1] < x, ends[:, :1] < x  # which ends lie left of which ray, shape (N, R)
+        segment, ray = np.nonzero(left != right)
+        (x_a, y_a), (x_b, y_b) = starts[segment].T, ends[segment].T
+        share = (x[ray] - x_a) / (x_b - x_a)
+        above = y_a + share * (y_b - y_a) > y[ray]
+        segment, ray, share = segment[above], ray[above], share[above]
+        letters = np.where(left[segment, ray], ray + 1, -(ray + 1))
+        order = np.lexsort((letters, share, segment))
+        words: list[Word] = [()] * len(starts)
+        first = np.searchsorted(segment[order], np.arange(len(starts) + 1))
+        spelled = letters[order].tolist()
+        for index in np.unique(segment).tolist():
+            words[index] = tuple(spelled[first[index] : first[index + 1]])
+        return words
+
+    def word(self, waypoints: FloatArray) -> Word:
+        """Reduced word of a polyline, shape (waypoints, 2)."""
+        word: Word = ()
+        for letters in self.crossings(waypoints[:-1], waypoints[1:]):
+            word = joined(word, letters)
+        return word
+
+
+def joined(word: Word, letters: Word) -> Word:
+    """Reduced word of one path followed by another.
+
+    Examples
+    --------
+    >>> joined((1, 2), (-2, 3)), joined((1,), (-1,))
+    ((1, 3), ())
+    """
+    result = list(word)
+    for letter in letters:
+        if result and result[-1] == -letter:
+            result.pop()
+        else:
+            result.append(letter)
+    return tuple(result)
+
+
+def inverse(word: Word) -> Word:
+    """Word of the path walked backwards."""
+    return tuple(-letter for letter in reversed(word))
+
+
+def shortest_paths_by_class(roadmap: Roadmap, rays: Rays, *, num_classes: int, max_length: float = math.inf) -> list[list[int]]:
+    """The shortest path from start to goal in each homotopy class, shortest first.
+
+    A* over (vertex, reduced word), with the distance to the goal as heuristic. Paths that cross themselves are dropped
+    on the way: they wind around an obstacle. At most `num_classes` words are expanded at a vertex, for these, followed
+    by the vertex's shortest way on, are as many classes already, none longer than what a further word would lead to.
+
+    Parameters
+    ----------
+    roadmap
+        From vertex 0 to vertex 1.
+    rays
+    num_classes
+        How many at most.
+    max_length
+        Metres.
+
+    Returns
+    -------
+    list of vertex lists
+    """
+    vertices: list[Point] = [(x, y) for x, y in roadmap.vertices.tolist()]
+    to_goal: list[float] = roadmap.distances_to(1).tolist()
+    neighbours = _neighbours(roadmap, rays)
+    words, word_ids = [Word()], {Word(): 0}
+    reached: list[dict[int, float]] = [{0: 0.0}]  # by word: the least length found to each vertex
+    expanded: list[set[int]] = [set() for _ in vertices]  # by vertex: words
+    trail = [_Step(0, -1)]
+    queue = [(to_goal[0], 0.0, 0, 0)]  # length by way of here, length so far, step of the trail, word
+    found: list[list[int]] = []
+    while queue and len(found) < num_classes:
+        _, length, step, word = heapq.heappop(queue)
+        vertex = trail[step].vertex
+        known = expanded[vertex]
+        if word in known or len(known) >= num_classes or (known and _crosses_itself(trail, step, vertices)):
+            continue
+        known.add(word)
+        if vertex == 1:
+            found.append(_walked_back(trail, step))
+        for neighbour, edge_length, letters in neighbours[vertex]:
+            total = length + edge_length
+            bound = total + to_goal[neighbour]
+            if bound > max_length:
+                continue
+            next_word = word
+            if letters:
+                spelled = joined(words[word], letters)
+                next_word = word_ids.setdefault(spelled, len(words))
+                if next_word == len(words):
+                    words.append(spelled)
+                    reached.append({})
+            if total < reached[next_word].get(neighbour, math.inf):
+                reached[next_word][neighbour] = total
+                heapq.heappush(queue, (bound, total, len(trail), next_word))
+                trail.append(_Step(neighbour, step))
+    return found
+
+
+class _Step(NamedTuple):
+    """A step of a search."""
+
+    vertex: int
+    before: int  # step, -1 for none
+
+
+def _neighbours(roadmap: Roadmap, rays: Rays) -> list[list[tuple[int, float, Word]]]:
+    """For each vertex its neighbours, the lengths of the edges to them and the letters that these spell."""
+    result: list[list[tuple[int, float, Word]]] = [[] for _ in roadmap.vertices]
+    a, b = roadmap.edges.T
+    words = rays.crossings(roadmap.vertices[a], roadmap.vertices[b])
+    pairs: list[list[int]] = roadmap.edges.tolist()
+    for (i, j), length, word in zip(pairs, roadmap.lengths.tolist(), words, strict=True):
+        result[i].append((j, length, word))
+        result[j].append((i, length, inverse(word)))
+    return result
+
+
+def _walked_back(trail: list[_Step], step: int) -> list[int]:
+    """Vertices from the first step to this one."""
+    path: list[int] = []
+    while step >= 0:
+        vertex, step = trail[step]
+        path.append(vertex)
+    return path[::-1]
+
+
+def _crosses_itself(trail: list[_Step], step: int, vertices: list[Point]) -> bool:
+    """Whether the last edge of a path crosses an earlier one, or leads to a vertex that it has been to."""
+    last, step = trail[step]
+    if step < 0:
+        return False
+    joint, step = trail[step]
+    a, b = vertices[joint], vertices[last]
+    x_min, x_max, y_min, y_max = min(a[0], b[0]), max(a[0], b[0]), min(a[1], b[1]), max(a[1], b[1])
+    later = joint
+    while step >= 0:
+        vertex, step = trail[step]
+        c, d = vertices[later], vertices[vertex]
+        apart = max(c[0], d[0]) < x_min or min(c[0], d[0]) > x_max or max(c[1], d[1]) < y_min or min(c[1], d[1]) > y_max
+        if vertex == last or (later != joint and not apart and _cross(a, b, c, d)):
+            return True
+        later = vertex
+    return False
+
+
+def _cross(a: Point, b: Point, c: Point, d: Point) -> bool:
+    """Whether two segments, a to b and c to d, cross in their interiors."""
+    return _left(a, b, c) != _left(a, b, d) and _left(c, d, a) != _left(c, d, b)
+
+
+def _left(a: Point, b: Point, c: Point) -> bool:
+    return (b[0] - a[0]) * (c[1] - a[1]) > (b[1] - a[1]) * (c[0] - a[0])

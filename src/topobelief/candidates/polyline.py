@@ -1,0 +1,85 @@
+"""Paths as polylines: arrays of shape (waypoints, 2), metres; how long they are and what lies where along them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from topobelief.arrays import FloatArray, frozen_floats
+from topobelief.errors import InvalidInputError
+
+_TINY = np.finfo(float).tiny
+
+
+class Stations(NamedTuple):
+    """Places along a path."""
+
+    positions: FloatArray  # shape (N, 2)
+    headings: FloatArray  # direction of travel, radians, shape (N,)
+
+
+def checked_path(path: ArrayLike, *, name: str = "path") -> FloatArray:
+    """A polyline without repeated waypoints.
+
+    Raises
+    ------
+    InvalidInputError
+        Where it is not an array of finite waypoints of shape (waypoints, 2), at least one.
+    """
+    array = frozen_floats(path, name=name)
+    if array.ndim != 2 or array.shape[1] != 2 or len(array) == 0 or not np.isfinite(array).all():
+        raise InvalidInputError(f"expected {name} as finite waypoints of shape (waypoints, 2), got {array.shape}")
+    return array[np.r_[True, (np.diff(array, axis=0) != 0).any(axis=1)]]
+
+
+def path_length(path: ArrayLike) -> float:
+    """Length of a polyline of shape (waypoints, 2), metres.
+
+    Examples
+    --------
+    >>> path_length([(0, 0), (3, 4), (3, 5)])
+    6.0
+    """
+    return float(_lengths_so_far(checked_path(path))[-1])
+
+
+def stations(path: FloatArray, distances: FloatArray) -> Stations:
+    """Where a path is after each distance, and which way it heads there: at a corner, the way that led to it.
+
+    Parameters
+    ----------
+    path : shape (waypoints, 2)
+        At least 2 waypoints, none repeated.
+    distances : shape (N,)
+        Metres along the path, from 0 to its length.
+    """
+    so_far = _lengths_so_far(path)
+    leg = np.clip(np.searchsorted(so_far, distances * (1 - 1e-12)) - 1, 0, len(path) - 2)
+    step = path[leg + 1] - path[leg]
+    share = (distances - so_far[leg]) / (so_far[leg + 1] - so_far[leg])
+    return Stations(path[leg] + share[:, None] * step, np.arctan2(step[:, 1], step[:, 0]))
+
+
+def sampled(path: FloatArray, count: int) -> FloatArray:
+    """Places at equal distances along a path, its ends among them; shape (count, 2)."""
+    return stations(path, np.linspace(0.0, path_length(path), count)).positions
+
+
+def subdivided(path: FloatArray, pieces: int) -> FloatArray:
+    """A path with each leg cut into equal pieces; its own waypoints stay as they are, every `pieces`-th of the result."""
+    shares = (np.arange(pieces) / pieces)[:, None]
+    legs = path[:-1, None] + shares * (path[1:] - path[:-1])[:, None]
+    return np.vstack([legs.reshape(-1, 2), path[-1:]])
+
+
+def distances_to_segments(point: FloatArray, starts: FloatArray, ends: FloatArray) -> FloatArray:
+    """Distance of a point, shape (2,), to each segment, shapes (N, 2); metres, shape (N,)."""
+    along = ends - starts
+    share = np.einsum("nk,nk->n", point - starts, along) / np.maximum(np.einsum("nk,nk->n", along, along), _TINY)
+    return np.linalg.norm(starts + np.clip(share, 0.0, 1.0)[:, None] * along - point, axis=1)
+
+
+def _lengths_so_far(path: FloatArray) -> FloatArray:
+    return np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))]

@@ -1,0 +1,62 @@
+"""The commands in one application, and what becomes of errors: one line and an exit code."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import Annotated, cast
+
+import typer
+
+from topobelief.cli.info import info
+from topobelief.cli.plan import plan
+from topobelief.errors import TopobeliefError
+
+BAD_INPUT = 2
+INTERRUPTED = 130
+
+# what all errors about options derive from, which typer does not export
+_UsageError = cast("type[Exception]", typer.BadParameter.__mro__[1])
+
+app = typer.Typer(name="topobelief", add_completion=False, pretty_exceptions_enable=False)
+app.command()(plan)
+app.command()(info)
+
+
+@app.callback(invoke_without_command=True)
+def _topobelief(  # pyright: ignore[reportUnusedFunction]  (typer calls it)
+    context: typer.Context,
+    show_version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
+) -> None:
+    """Where should a robot drive next, when its map is a pose graph?
+
+    Ranks paths by the topology of the graph that they leave, with bounds on what that can cost.
+    """
+    if show_version:
+        from importlib.metadata import version  # slow to load
+
+        typer.echo(f"topobelief {version('topobelief')}")
+    elif context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run a command and return its exit code."""
+    try:
+        code = app(args=None if arguments is None else list(arguments), prog_name="topobelief", standalone_mode=False)
+    except (KeyboardInterrupt, typer.Abort):
+        code = INTERRUPTED
+    except TopobeliefError as error:
+        return _failed(str(error))
+    except _UsageError as error:
+        describe = getattr(error, "format_message", error.__str__)  # which names the option
+        command = getattr(getattr(error, "ctx", None), "command_path", "topobelief")
+        return _failed(f"{describe().rstrip('.')}; see `{command} --help`")
+    if code == INTERRUPTED:
+        print("topobelief: interrupted; nothing was left half-written", file=sys.stderr)
+    return int(code or 0)
+
+
+def _failed(message: str) -> int:
+    print(f"topobelief: {' '.join(message.split())}", file=sys.stderr)
+    return BAD_INPUT

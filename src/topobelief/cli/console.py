@@ -1,0 +1,59 @@
+"""Where a command speaks: its answer on stdout, progress on stderr while it lasts, and how long each stage took."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Callable, Generator, Mapping
+from contextlib import contextmanager
+
+from rich.console import Console, RenderableType
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+Update = Callable[[int, int], None]
+"""Called with how much is done, and out of how much."""
+
+_PIPE_WIDTH = 160  # columns where there is no terminal to ask
+
+
+class Reporter:
+    """Speaks to a person, or, for a program, prints one JSON document and nothing else.
+
+    Parameters
+    ----------
+    as_json
+        Whether a program listens.
+    """
+
+    def __init__(self, *, as_json: bool) -> None:
+        self.as_json = as_json
+        self.seconds: dict[str, float] = {}
+        self._answer = Console(width=None if sys.stdout.isatty() else _PIPE_WIDTH, highlight=False)
+        self._progress = Console(stderr=True)
+
+    def say(self, *renderables: RenderableType) -> None:
+        """Print for a person; text is taken as it is, not as markup."""
+        if not self.as_json:
+            for renderable in renderables:
+                self._answer.print(renderable, markup=False, soft_wrap=isinstance(renderable, str))
+
+    def answer(self, document: Mapping[str, object]) -> None:
+        """Print for a program."""
+        if self.as_json:
+            print(json.dumps(document, indent=2, allow_nan=False))
+
+    @contextmanager
+    def stage(self, name: str) -> Generator[Update]:
+        """Time a stage and show it on stderr while it lasts, where that is a terminal."""
+        begin = time.perf_counter()
+        columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+        with Progress(*columns, console=self._progress, transient=True, disable=not self._progress.is_terminal) as bar:
+            task = bar.add_task(name, total=None)
+            yield lambda done, total: bar.update(task, completed=done, total=total, description=f"{name} {done}/{total}")
+        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - begin
+
+    def time_taken(self) -> str:
+        """Seconds in all and by stage."""
+        stages = ", ".join(f"{name} {seconds:.1f}" for name, seconds in self.seconds.items())
+        return f"{sum(self.seconds.values()):.1f} s: {stages}"

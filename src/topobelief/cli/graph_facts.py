@@ -1,0 +1,167 @@
+"""What there is to know of a pose graph, in the order in which a person asks: size, fit, topology, uncertainty."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from rich.table import Table
+
+from topobelief.bounds import entropy_bounds
+from topobelief.bounds.entropy_bounds import Determinant, Family
+from topobelief.cli.console import Reporter
+from topobelief.cli.prior import read_prior
+from topobelief.entropy import joint_entropy_estimate
+from topobelief.errors import IllConditionedError, InvalidGraphError
+from topobelief.graph.information import isotropic_weights, shared_information
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.report.tables import quantity_table
+from topobelief.signatures.spanning_trees import log_num_spanning_trees, spanning_tree_signature
+from topobelief.signatures.von_neumann import (
+    DENSE_SPECTRUM_SIZE,
+    expected_spectrum_seconds,
+    von_neumann_entropy,
+    von_neumann_entropy_approx,
+)
+
+_BOUNDS: tuple[tuple[Family, Determinant], ...] = (
+    ("fischer", "cholesky"),
+    ("fischer", "hadamard"),
+    ("paper", "cholesky"),
+    ("paper", "hadamard"),
+)
+
+Value = str | int | float | None | dict[str, float] | list[int]
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """One line: for a program a key and a value, for a person a label and a text."""
+
+    key: str
+    value: Value
+    label: str  # empty where only a program cares
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """Facts in groups, each with a heading."""
+
+    groups: dict[str, list[Fact]]
+
+    def tables(self) -> list[Table]:
+        """For a person."""
+        return [
+            quantity_table(heading, [(fact.label, fact.text) for fact in facts if fact.label])
+            for heading, facts in self.groups.items()
+        ]
+
+    def document(self) -> dict[str, object]:
+        """For a program."""
+        return {fact.key: fact.value for facts in self.groups.values() for fact in facts}
+
+
+def describe(path: Path, reporter: Reporter, *, optimized: bool) -> Facts:
+    """All facts of a file's graph.
+
+    Raises
+    ------
+    FileError
+        If the file is wrong, or its graph is not connected.
+    """
+    prior = read_prior(path, reporter, optimized=optimized)
+    filed, graph = prior.filed, prior.graph
+    at = "at the optimised poses" if optimized else "at the poses as filed"
+    with reporter.stage("quantities"):
+        return Facts(
+            {
+                str(path): [Fact("file", str(path), "", ""), *_size(filed)],
+                "Fit": list(_fit(filed, graph, optimized=optimized)),
+                "Topology": list(_topology(graph)),
+                f"Uncertainty {at}": list(_uncertainty(graph)),
+            }
+        )
+
+
+def _size(graph: PoseGraph) -> Iterator[Fact]:
+    topology = graph.topology
+    gap = np.abs(graph.edges[:, 0] - graph.edges[:, 1])
+    closures = int(np.count_nonzero(gap > 1))
+    parallel = topology.num_edges - topology.simple().num_edges
+    degrees = topology.degrees
+    steps = np.linalg.norm(np.diff(graph.positions, axis=0), axis=1)
+    yield Fact("space", graph.group.name, "space", graph.group.name)
+    yield Fact("num_poses", graph.num_poses, "poses", str(graph.num_poses))
+    yield Fact("num_edges", graph.num_edges, "edges", str(graph.num_edges))
+    yield Fact("num_loop_closures", closures, "of these loop closures", f"{closures} (not between consecutive poses)")
+    yield Fact("num_parallel_edges", parallel, "of these parallel", f"{parallel} (beyond the first between two poses)")
+    fixed = [int(graph.ids[index]) for index in graph.fixed]
+    yield Fact("fixed", fixed, "fixed in the file", ", ".join(map(str, fixed)) or "none")
+    yield Fact("mean_degree", float(degrees.mean()), "mean degree", f"{degrees.mean():.2f}")
+    yield Fact("max_degree", int(degrees.max()), "largest degree", f"{degrees.max()} (pose {graph.ids[degrees.argmax()]})")
+    yield Fact("num_components", topology.num_components, "connectivity", "connected")
+    yield Fact("length", float(steps.sum()), "length from pose to pose", f"{steps.sum():.1f} m as filed")
+    yield Fact("noise", _noise(graph), "noise", _noise(graph))
+
+
+def _noise(graph: PoseGraph) -> str:
+    if graph.num_edges == 0:
+        return "no edges"
+    weights = isotropic_weights(graph.information)
+    if shared_information(graph.information) is None:
+        return f"differs between edges{'' if weights is None else ', each block-isotropic'}"
+    if weights is None:
+        return "one matrix for all edges, not block-isotropic"
+    sigma_p, sigma_r = (float(weight[0]) ** -0.5 for weight in weights)
+    return f"one for all edges, block-isotropic: {sigma_p:.4g} m, {sigma_r:.4g} rad"
+
+
+def _fit(filed: PoseGraph, graph: PoseGraph, *, optimized: bool) -> Iterator[Fact]:
+    freedom = filed.degrees_of_freedom
+    yield Fact("degrees_of_freedom", freedom, "degrees of freedom", str(freedom))
+    for key, label, at in (("filed", "as filed", filed), ("optimized", "optimised", graph)):
+        if not optimized and key == "optimized":
+            continue
+        ratio = at.chi2 / freedom if freedom else None
+        text = f"{ratio:.4g}" if ratio is not None else "none: the graph is a tree"
+        yield Fact(f"chi2_per_dof_{key}", ratio, f"χ² per degree of freedom, {label}", text)
+
+
+def _topology(graph: PoseGraph) -> Iterator[Fact]:
+    topology, size = graph.topology, graph.num_poses
+    tau = log_num_spanning_trees(topology)
+    yield Fact("log_num_spanning_trees", tau, "τ, log number of spanning trees", f"{tau:.4f}")
+    if size <= DENSE_SPECTRUM_SIZE:
+        exact = von_neumann_entropy(topology)
+        yield Fact("von_neumann_entropy", exact, "s_VN, von Neumann entropy", f"{exact:.4f}")
+    else:
+        text = f"not computed: some {expected_spectrum_seconds(size):.0f} s for the spectrum of {size} poses"
+        yield Fact("von_neumann_entropy", None, "s_VN, von Neumann entropy", text)
+    degrees = von_neumann_entropy_approx(topology)
+    yield Fact("von_neumann_entropy_approx", degrees, "ŝ_VN, the same by degrees", f"{degrees:.4f}")
+    signature = spanning_tree_signature(topology, graph.information)
+    yield Fact("spanning_tree_signature", signature, "s_ST, spanning-tree signature", f"{signature:.4f} nats")
+
+
+def _uncertainty(graph: PoseGraph) -> Iterator[Fact]:
+    label = "J, joint entropy"
+    try:
+        entropy = joint_entropy_estimate(graph)
+        yield Fact("joint_entropy", entropy.value, label, f"{entropy.value:.4f} nats (rounding error {entropy.error:.0e})")
+        yield Fact("joint_entropy_error", entropy.error, "", "")
+    except IllConditionedError as error:
+        yield Fact("joint_entropy", None, label, f"not known: {error}")
+    for family, determinant in _BOUNDS:
+        key = f"bounds_{family}_{determinant}"
+        label = f"its bounds, {family}, {determinant}"
+        try:
+            bounds = entropy_bounds(graph, family=family, determinant=determinant)
+            text = f"{bounds.lower:.4f} … {bounds.upper:.4f} nats"
+            yield Fact(key, {"lower": bounds.lower, "upper": bounds.upper}, label, text)
+        except InvalidGraphError:
+            yield Fact(key, None, label, "do not apply: they need one block-isotropic noise on all edges")
+        except IllConditionedError as error:
+            yield Fact(key, None, label, f"not known: {error}")

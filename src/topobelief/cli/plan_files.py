@@ -1,0 +1,127 @@
+"""What `topobelief plan` leaves behind: paths.png, bounds.png and decision.json, all of them whole or none."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from topobelief.arrays import FloatArray
+from topobelief.cli.console import Reporter
+from topobelief.cli.plan_stages import CandidateRule, Candidates
+from topobelief.errors import FileError
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.io.files import atomic_file
+from topobelief.planning.decision import Decision
+from topobelief.world import World
+
+
+@dataclass(frozen=True, eq=False)
+class PlanResult:
+    """A decision and all that it was made from."""
+
+    graph: PoseGraph
+    world: World
+    candidates: Candidates
+    decision: Decision
+    entropies: FloatArray  # (K,): exact values, whether or not the decision needed them; nan where unknown
+    goal: tuple[float, float]
+    rule: CandidateRule
+    options: Mapping[str, object]  # as given, what the rule settles aside
+
+
+def checked_folder(folder: Path | None) -> Path | None:
+    """The folder to write to, before any work is done for it.
+
+    Raises
+    ------
+    FileError
+        Where a file is in its place, or it cannot be written to or made.
+    """
+    if folder is None:
+        return None
+    nearest = folder
+    while not nearest.exists() and nearest != nearest.parent:
+        nearest = nearest.parent
+    if not nearest.is_dir():
+        raise FileError(nearest, "expected a folder to write to, got a file; choose another --out")
+    if not os.access(nearest, os.W_OK | os.X_OK):
+        raise FileError(nearest, "expected a folder to write to, got one without permission; choose another --out")
+    return folder
+
+
+def document(result: PlanResult) -> dict[str, object]:
+    """The decision (`Decision.from_dict` reads it), with the paths and all that repeats the plan."""
+    decision, graph = result.decision, result.graph
+    plain = decision.to_dict()
+    exact = [value if math.isfinite(value) else None for value in result.entropies.tolist()]
+    described = zip(plain["actions"], result.candidates.paths, exact, strict=True)
+    actions = [{**action, "waypoints": path.tolist(), "exact_for_comparison": value} for action, path, value in described]
+    return {
+        **plain,
+        "actions": actions,
+        "topobelief": version("topobelief"),
+        "graph": {"num_poses": graph.num_poses, "num_edges": graph.num_edges, "chi2": graph.chi2},
+        "start": graph.poses[-1].tolist(),
+        "goal": list(result.goal),
+        "options": {name: _plain(value) for name, value in {**result.options, **asdict(result.rule)}.items()},
+    }
+
+
+def _plain(value: object) -> object:
+    """For JSON: None for no limit, text for paths, lists for arrays."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return str(value) if isinstance(value, Path) else value
+
+
+def write(folder: Path, result: PlanResult, reporter: Reporter) -> None:
+    """Draw and write everything, and say where it is and how long all took."""
+    with reporter.stage("pictures"):
+        from topobelief.report.bounds_figure import draw_bounds
+        from topobelief.report.canvas import save_figure
+        from topobelief.report.paths_figure import draw_paths
+
+        candidates, decision = result.candidates, result.decision
+        paths = draw_paths(result.graph, result.world, candidates.paths, candidates.actions, decision, goal=result.goal)
+        bounds = draw_bounds(decision, result.entropies)
+        text = json.dumps(document(result), indent=2, allow_nan=False) + "\n"
+        write_together(
+            folder,
+            {
+                "paths.png": lambda path: save_figure(paths, path),
+                "bounds.png": lambda path: save_figure(bounds, path),
+                "decision.json": lambda path: path.write_text(text, encoding="utf-8"),
+            },
+        )
+    reporter.say(
+        "",
+        f"Pictures: {folder / 'paths.png'} and {folder / 'bounds.png'}; decision: {folder / 'decision.json'}",
+        f"Took {reporter.time_taken()}",
+    )
+
+
+def write_together(folder: Path, writers: Mapping[str, Callable[[Path], object]]) -> None:
+    """Write files beside their places first; they take their names once all are complete.
+
+    Raises
+    ------
+    FileError
+        If the folder cannot be made or a file not be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(folder, f"expected a folder to write to, got: {error.strerror}") from None
+    with ExitStack() as stack:
+        for name, write_to in writers.items():
+            write_to(stack.enter_context(atomic_file(folder / name)))

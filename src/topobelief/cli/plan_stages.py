@@ -1,0 +1,194 @@
+"""The stages of `topobelief plan`: read, optimise, find candidates, decide; each tells what it did."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from time import monotonic
+
+import numpy as np
+
+from topobelief.arrays import FloatArray
+from topobelief.candidates.diverse_paths import diverse_paths
+from topobelief.candidates.homotopy import Rays
+from topobelief.candidates.polyline import path_length
+from topobelief.candidates.predicted_factors import default_information, predict_actions
+from topobelief.candidates.roadmap import build_roadmap
+from topobelief.cli.console import Reporter
+from topobelief.cli.prior import read_prior
+from topobelief.errors import FileError, InvalidInputError
+from topobelief.graph.action import Action
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.io import floor_plan
+from topobelief.io.ros_map import Unknown
+from topobelief.planning.decision import Decision
+from topobelief.planning.decision_quality import rank_correlation
+from topobelief.planning.planner import Planner
+from topobelief.report.tables import candidate_table
+from topobelief.world import World
+from topobelief.world.trajectory import default_width
+
+EXACT_SECONDS = 3.0
+"""How long exact values that the decision did not need may take, for the picture of the bounds."""
+
+_LENGTH_BIAS = 0.9  # rank correlation with the number of poses above which the ranking mostly counts them
+_FEWEST_TO_JUDGE = 6  # candidates
+
+
+@dataclass(frozen=True, eq=False)
+class CandidateRule:
+    """How candidates are found and their factors predicted; names and units as in the room `candidates`."""
+
+    num_paths: int
+    max_detour: float
+    num_vertices: int
+    robot_radius: float
+    seed: int
+    spacing: float
+    closure_radius: float
+    closure_angle: float
+    min_index_gap: int
+    line_of_sight: bool
+    information: FloatArray | None  # None: the graph's own
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """K paths, shortest first, and what each would add to the graph."""
+
+    paths: list[FloatArray]
+    actions: list[Action]
+
+
+def information(sigma_p: float | None, sigma_theta: float | None) -> FloatArray | None:
+    """Information matrix in SE(2) of independent noise; None where none is given.
+
+    Raises
+    ------
+    InvalidInputError
+        Where one of the two is missing.
+    """
+    if sigma_p is None and sigma_theta is None:
+        return None
+    if sigma_p is None or sigma_theta is None:
+        raise InvalidInputError("expected both --sigma-p and --sigma-theta or neither, got one; give both")
+    return np.diag([sigma_p**-2, sigma_p**-2, sigma_theta**-2])
+
+
+def read_graph(path: Path, reporter: Reporter, *, optimized: bool) -> PoseGraph:
+    """The prior, in the plane.
+
+    Raises
+    ------
+    FileError
+        For a graph in SE(3), besides all that `read_prior` refuses.
+    """
+    prior = read_prior(path, reporter, optimized=optimized)
+    filed, graph = prior.filed, prior.graph
+    if graph.group.position_dim != 2:
+        raise FileError(path, f"expected a graph in SE(2) to plan in the plane, got one in {graph.group.name}")
+    reporter.say(f"{path}: {graph.num_poses} poses, {graph.num_edges} edges")
+    if optimized:
+        reporter.say(f"χ² per degree of freedom: {chi2_per_dof(filed)} as filed, {chi2_per_dof(graph)} optimised")
+    return graph
+
+
+def chi2_per_dof(graph: PoseGraph) -> str:
+    """χ² over the degrees of freedom, for a person; a tree has none."""
+    return f"{graph.chi2 / graph.degrees_of_freedom:.3g}" if graph.degrees_of_freedom else "none (a tree)"
+
+
+def read_world(map_file: Path | None, graph: PoseGraph, reporter: Reporter, *, width: float | None, unknown: Unknown) -> World:
+    """The floor plan, or what lies along the trajectory where there is none."""
+    with reporter.stage("world"):
+        if map_file is not None:
+            world, source = floor_plan.read_world(map_file, unknown=unknown), str(map_file)
+        else:
+            width = default_width(graph) if width is None else width
+            world, source = World.from_trajectory(graph, width), f"within {width:.2f} m of the trajectory"
+    x_min, y_min, x_max, y_max = world.bounds
+    reporter.say(f"world: {source}, {x_max - x_min:.1f} × {y_max - y_min:.1f} m")
+    return world
+
+
+def find_candidates(
+    graph: PoseGraph, world: World, goal: Sequence[float], rule: CandidateRule, reporter: Reporter
+) -> Candidates:
+    """Diverse paths from the last pose to the goal, and the factors that each would add."""
+    start = graph.positions[-1]
+    max_detour = rule.max_detour if math.isfinite(rule.max_detour) else None
+    with reporter.stage("paths"):
+        roadmap = build_roadmap(world, start, goal, rule.num_vertices, rule.robot_radius, rule.seed)
+        paths = diverse_paths(roadmap, start, goal, rule.num_paths, max_detour, rule.seed)
+    lengths = [path_length(path) for path in paths]
+    rays = Rays.of_obstacles(roadmap, max_length=max(lengths))
+    num_classes = len({rays.word(path) for path in paths})
+    fewer = f" of {rule.num_paths} asked for" if len(paths) < rule.num_paths else ""
+    reporter.say(
+        f"{_counted(len(paths), 'path')}{fewer} from ({start[0]:.2f}, {start[1]:.2f}) to ({goal[0]:.2f}, {goal[1]:.2f}): "
+        f"{_counted(num_classes, 'homotopy class', 'homotopy classes')}, {min(lengths):.1f} to {max(lengths):.1f} m"
+    )
+    with reporter.stage("factors"):
+        actions = predict_actions(
+            graph,
+            paths,
+            information=default_information(graph) if rule.information is None else rule.information,
+            spacing=rule.spacing,
+            closure_radius=rule.closure_radius,
+            closure_angle=rule.closure_angle,
+            min_index_gap=rule.min_index_gap,
+            world=world if rule.line_of_sight else None,
+        )
+    return Candidates(paths, actions)
+
+
+def exact_entropies(
+    planner: Planner, actions: Sequence[Action], decision: Decision, reporter: Reporter, *, wanted: bool
+) -> FloatArray:
+    """What the decision evaluated and, if wanted and time allows, the rest in ranking order; nan where unknown; shape (K,)."""
+    values = decision.entropies.copy()
+    if not wanted:
+        return values
+    begin = monotonic()
+    with reporter.stage("exact values") as update:
+        ranking: list[int] = decision.ranking.tolist()
+        for done, action in enumerate(ranking):
+            if monotonic() - begin > EXACT_SECONDS:
+                break
+            if math.isnan(values[action]):
+                values[action] = planner.entropies([actions[action]])[0]
+            update(done + 1, len(actions))
+    known = int(np.count_nonzero(~np.isnan(values)))
+    if known < len(actions):
+        reporter.say(f"exact values in the picture: the first {known} of the ranking, all that {EXACT_SECONDS:g} s allowed")
+    return values
+
+
+def say_decision(decision: Decision, reporter: Reporter) -> None:
+    """The answer, what to make of it, and the table."""
+    reporter.say("", decision.summary())
+    hint = length_bias_hint(decision)
+    if hint:
+        reporter.say(hint)
+    reporter.say(candidate_table(decision))
+
+
+def length_bias_hint(decision: Decision) -> str | None:
+    """One line where a ranking by joint entropy mostly follows the number of poses."""
+    if decision.objective != "joint" or decision.num_actions < _FEWEST_TO_JUDGE:
+        return None
+    ranking: list[int] = decision.ranking.tolist()
+    poses = [decision.candidates[action].num_new_poses for action in ranking]
+    correlation = rank_correlation(-np.arange(decision.num_actions), poses)
+    if not correlation > _LENGTH_BIAS:  # nan where all have as many
+        return None
+    return (
+        f"This ranking mostly counts poses (rank correlation {correlation:.2f}): joint entropy falls with every pose added; "
+        "--objective map compares candidates on the poses that exist now."
+    )
+
+
+def _counted(count: int, noun: str, plural: str = "") -> str:
+    return f"{count} {noun if count == 1 else plural or noun + 's'}"

@@ -1,0 +1,91 @@
+"""Floor plans in files: walls as boxes in CSV, and any kind of map by its suffix.
+
+A CSV plan has the header `x_min,y_min,x_max,y_max`, then one wall a line, in metres. A line that begins with # is a
+comment; one of the form `# bounds: x_min y_min x_max y_max` says what the plan shows and where its fence stands. Without
+it the plan ends where its walls end.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from topobelief.errors import FileError, InvalidMapError
+from topobelief.io.files import StrPath, read_text
+from topobelief.io.ros_map import Unknown, read_ros_map
+from topobelief.world import World
+
+_HEADER = ["x_min", "y_min", "x_max", "y_max"]
+_BOUNDS = re.compile(r"#\s*bounds\s*:(.*)")
+_EXPECTED = "four finite numbers x_min, y_min, x_max, y_max with min < max"
+
+
+def read_world(path: StrPath, *, unknown: Unknown = "occupied") -> World:
+    """A world by the suffix of its file: .yaml or .yml a ROS map, .csv walls.
+
+    Parameters
+    ----------
+    path
+    unknown
+        What the unknown cells of a ROS map are taken for.
+
+    Raises
+    ------
+    FileError
+        For any other suffix, and where the file is not what it should be.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix in (".yaml", ".yml"):
+        return read_ros_map(path, unknown=unknown)
+    if suffix == ".csv":
+        return read_walls(path)
+    raise FileError(path, f"expected a map that ends in .yaml, .yml (ROS map) or .csv (walls), got {suffix or 'no suffix'}")
+
+
+def read_walls(path: StrPath, *, bounds: Sequence[float] | None = None) -> World:
+    """The world of a floor plan in CSV.
+
+    Parameters
+    ----------
+    path
+    bounds : (x_min, y_min, x_max, y_max), optional
+        Metres; in place of those in the file.
+
+    Raises
+    ------
+    FileError
+        Names the file and the line.
+    """
+    boxes: list[list[float]] = []
+    has_header = False
+    for number, line in enumerate(read_text(path).splitlines(), start=1):
+        text = line.strip()
+        if match := _BOUNDS.fullmatch(text):
+            in_file = _extent(path, number, match[1].replace(",", " ").split(), "bounds")
+            bounds = in_file if bounds is None else bounds
+        elif not text or text.startswith("#"):
+            continue
+        elif not has_header:
+            if [name.strip() for name in text.split(",")] != _HEADER:
+                raise FileError(path, f"expected the header {','.join(_HEADER)}, got {text[:60]!r}", line=number)
+            has_header = True
+        else:
+            boxes.append(_extent(path, number, text.split(","), "a wall"))
+    if not has_header:
+        raise FileError(path, f"expected the header {','.join(_HEADER)}, got no line but comments")
+    try:
+        return World.from_boxes(boxes, bounds)
+    except InvalidMapError as error:
+        raise FileError(path, str(error)) from None
+
+
+def _extent(path: StrPath, line: int, fields: list[str], what: str) -> list[float]:
+    try:
+        numbers = [float(field) for field in fields]
+    except ValueError:
+        numbers = []
+    if len(numbers) == 4 and all(map(math.isfinite, numbers)) and numbers[0] < numbers[2] and numbers[1] < numbers[3]:
+        return numbers
+    raise FileError(path, f"expected {what} as {_EXPECTED}, got {' '.join(fields)[:60]!r}", line=line)

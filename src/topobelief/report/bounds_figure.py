@@ -1,0 +1,170 @@
+"""Bounds of the objective and its exact value for each candidate, in ranking order, beside what a person knows of it.
+
+A candidate whose lower bound lies right of the dashed line, the upper bound of the chosen one, cannot be the best: that is
+how Algorithm 1 of Kitanov and Indelman (arXiv 1903.00927) rules actions out without evaluating them.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
+
+from topobelief.arrays import FloatArray
+from topobelief.planning.decision import Decision
+from topobelief.report import style
+from topobelief.report.canvas import Align, Canvas, Entry, Panel
+
+_WIDTH = 7.6  # inches, as all lengths here
+_ROW = 0.205
+_TOP, _BOTTOM = 1.0, 0.92
+_PLOT_LEFT, _PLOT_RIGHT = 3.0, 0.25
+_MARGIN = 0.38
+_COLUMNS: tuple[tuple[str, float, Align], ...] = (
+    ("", 0.28, "right"),
+    ("candidate", _MARGIN, "left"),
+    ("length", 1.62, "right"),
+    ("poses", 2.15, "right"),
+    ("closures", 2.78, "right"),
+)
+_NAME_COLUMN = 11  # characters that fit it
+_OBJECTIVES = {
+    "joint": "joint entropy of all poses after the action (nats)",
+    "map": "entropy of the poses that exist now, after the action (nats)",
+    "per_pose": "joint entropy per pose after the action (nats)",
+}
+
+
+def draw_bounds(decision: Decision, entropies: ArrayLike | None = None) -> Figure:
+    """Interval [LB, UB] of each action in ranking order, with the exact value where it is known.
+
+    Parameters
+    ----------
+    decision
+        Its bounds may be missing.
+    entropies : shape (K,), optional
+        Exact objective of each action, cost excluded, nan where unknown. Default: those that the decision evaluated.
+
+    Returns
+    -------
+    Figure
+        `topobelief.report.canvas.save_figure` writes it.
+    """
+    exact = decision.entropies if entropies is None else np.asarray(entropies, dtype=np.float64)
+    costs = np.array([candidate.cost for candidate in decision.candidates])
+    rows = decision.num_actions
+    with style.style():
+        canvas = Canvas(_WIDTH, _TOP + _BOTTOM + _ROW * rows)
+        panel = canvas.panel(_PLOT_LEFT, _BOTTOM, _WIDTH - _PLOT_LEFT - _PLOT_RIGHT, _ROW * rows)
+        key = _draw_intervals(panel, decision)
+        key += _draw_exact(panel, decision, exact + costs)
+        key += _draw_threshold(panel, decision)
+        panel.axes.set_ylim(rows - 0.5, -0.5)
+        panel.axes.margins(x=0.03)
+        panel.value_axis(_OBJECTIVES[decision.objective] + (", plus cost" if costs.any() else ""))
+        _write_columns(canvas, decision)
+        canvas.title(_MARGIN, canvas.height - 0.50, _title(decision), _subtitle(decision))
+        if key:
+            canvas.key(key, _MARGIN, 0.12, corner="lower left", columns=len(key))
+    return canvas.figure
+
+
+def _draw_intervals(panel: Panel, decision: Decision) -> list[Entry]:
+    colours = style.standing_colours(decision)
+    drawn: set[str] = set()
+    ranking: list[int] = decision.ranking.tolist()
+    for row, action in enumerate(ranking):
+        if row % 2:
+            panel.axes.axhspan(row - 0.5, row + 0.5, color=style.STRIPE, linewidth=0, zorder=0)
+        if math.isfinite(decision.lower[action]) or math.isfinite(decision.upper[action]):
+            colour = colours[action]
+            drawn.add(colour)
+            ends = [(float(decision.lower[action]), row), (float(decision.upper[action]), row)]
+            panel.line(ends, color=colour, linewidth=5, solid_capstyle="butt", alpha=0.75, zorder=3)
+            panel.line(ends, linestyle="none", marker="|", color=colour, markersize=6.5, zorder=3)
+    labels = {style.BEST: "chosen", style.SURVIVOR: "may be optimal", style.RULED_OUT: "ruled out"}
+    return [
+        Entry(label, color=colour, linewidth=5, alpha=0.75, solid_capstyle="butt")
+        for colour, label in labels.items()
+        if colour in drawn
+    ]
+
+
+def _draw_exact(panel: Panel, decision: Decision, values: FloatArray) -> list[Entry]:
+    """Filled where the decision evaluated it, hollow where it is known for comparison alone."""
+    key: list[Entry] = []
+    needed = ~np.isnan(decision.entropies)
+    for label, chosen, fill in (("exact, evaluated", needed, style.INK), ("exact, to compare", ~needed, "white")):
+        shown = np.where(chosen, values, np.nan)[decision.ranking]
+        if np.isnan(shown).all():
+            continue
+        look: dict[str, Any] = {"marker": "D", "markersize": 3.6, "markerfacecolor": fill, "markeredgecolor": style.INK}
+        look |= {"linestyle": "none", "markeredgewidth": 0.9}
+        panel.line(np.stack([shown, np.arange(len(shown))], axis=1), zorder=5, **look)
+        key.append(Entry(label, **look))
+    return key
+
+
+def _draw_threshold(panel: Panel, decision: Decision) -> list[Entry]:
+    """What a lower bound must not exceed: the chosen one's upper bound, or its value once evaluated."""
+    threshold = float(decision.upper[decision.best])
+    if not math.isfinite(threshold):
+        return []
+    look: dict[str, Any] = {"color": style.INK, "linewidth": 0.9, "linestyle": (0, (4, 2))}
+    panel.axes.axvline(threshold, zorder=4, **look)
+    evaluated = not math.isnan(decision.entropies[decision.best])
+    return [Entry("least value found" if evaluated else "its upper bound", **look)]
+
+
+def _write_columns(canvas: Canvas, decision: Decision) -> None:
+    """The left part: a table whose rows are those of the plot."""
+    colours = style.standing_colours(decision)
+
+    def write(y: float, cells: tuple[str, ...], looks: list[dict[str, str]]) -> None:
+        for (_, x, align), cell, look in zip(_COLUMNS, cells, looks, strict=True):
+            canvas.text(x, y, cell, align=align, fontsize=8, **look)
+
+    muted = {"color": style.MUTED}
+    write(canvas.height - _TOP + 0.08, tuple(name for name, _, _ in _COLUMNS), [muted] * len(_COLUMNS))
+    ranking: list[int] = decision.ranking.tolist()
+    for row, action in enumerate(ranking):
+        candidate = decision.candidates[action]
+        best = action == decision.best
+        look = {"color": colours[action], "fontweight": "bold"} if best else {"color": style.INK}
+        cells = (
+            str(row + 1),
+            style.short_name(decision, action, limit=_NAME_COLUMN),
+            f"{candidate.length:.1f} m",
+            str(candidate.num_new_poses),
+            str(candidate.num_closures),
+        )
+        write(canvas.height - _TOP - (row + 0.5) * _ROW - 0.04, cells, [muted] + [look] * (len(cells) - 1))
+
+
+def _title(decision: Decision) -> str:
+    chosen, total = style.short_name(decision, decision.best), decision.num_actions
+    ruled_out = total - len(decision.survivors)
+    if total == 1:
+        return f"{chosen}, the only candidate"
+    if np.isnan(decision.lower).any():
+        return f"{chosen} is chosen among {total} candidates"
+    if not ruled_out:
+        return "No candidate is ruled out: the lower bounds of all lie left of the dashed line"
+    whose = "its" if ruled_out == 1 else "their"
+    return f"{ruled_out} of {total} candidates cannot be the best: {whose} lower bound exceeds the dashed line"
+
+
+def _subtitle(decision: Decision) -> str:
+    ranked = f"in the order of {style.SIGNATURES.get(decision.signature, decision.signature)}, best first"
+    if decision.margin_met is not None:
+        return f"{ranked}; the margin is {'met' if decision.margin_met else 'missed'}"
+    if decision.proven_optimal:
+        return f"{ranked}; the chosen one is proven optimal"
+    if math.isinf(decision.error_bound):
+        return f"{ranked}; not all have bounds"
+    unit = "nats per pose" if decision.objective == "per_pose" else "nats"
+    bound = f"{decision.error_bound:.3g}" if decision.error_bound < 1000 else f"{decision.error_bound:.0f}"
+    return f"{ranked}; none is better than the chosen one by more than {bound} {unit}"

@@ -1,0 +1,187 @@
+"""Planar shapes: the one door to shapely, with arrays of coordinates on this side and types that can be checked.
+
+Predicates are exact to rounding; shapes with round parts have chords in place of arcs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any, cast
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import MultiPolygon, Point, Polygon
+
+from topobelief.arrays import BoolArray, FloatArray, IntArray
+
+Shape = shapely.Geometry
+ShapeArray = NDArray[Any]  # of shapely geometries, dtype object
+
+_QUADRANT_CHORDS = 8  # chords for a quarter circle, off it by 0.5 % of the radius
+_SEGMENTS_PER_PIECE = 16
+
+_shapely = cast("Any", shapely)  # whose stubs cannot say that arrays in are arrays out
+
+
+def rectangles(corners: FloatArray) -> ShapeArray:
+    """Rectangles from rows x_min, y_min, x_max, y_max; shape (N, 4)."""
+    return _shapely.box(*corners.T)
+
+
+def point(place: FloatArray) -> Point:
+    """One place, shape (2,)."""
+    return Point(*place.tolist())
+
+
+def segments(starts: FloatArray, ends: FloatArray) -> ShapeArray:
+    """Straight segments; shapes (N, 2). One of no length is a point: GEOS finds nothing near a line of no length."""
+    lines = _shapely.linestrings(np.stack([starts, ends], axis=1))
+    no_length = (starts == ends).all(axis=1)
+    lines[no_length] = _shapely.points(starts[no_length])
+    return lines
+
+
+def discs(centres: FloatArray, radius: float) -> ShapeArray:
+    """Discs; centres of shape (N, 2)."""
+    return _shapely.buffer(_shapely.points(centres), radius, quad_segs=_QUADRANT_CHORDS)
+
+
+def capsules(starts: FloatArray, ends: FloatArray, radius: float) -> ShapeArray:
+    """All within a radius of each segment; shapes (N, 2)."""
+    return _shapely.buffer(segments(starts, ends), radius, quad_segs=_QUADRANT_CHORDS)
+
+
+def faces(starts: FloatArray, ends: FloatArray) -> ShapeArray:
+    """The bounded faces into which segments that meet at their ends only divide the plane; shapes (N, 2)."""
+    return _shapely.get_parts(_shapely.polygonize(segments(starts, ends)))
+
+
+def together(shapes: ShapeArray) -> MultiPolygon:
+    """Polygons that do not overlap, as one shape."""
+    return MultiPolygon(shapes.tolist())
+
+
+def union(shapes: ShapeArray) -> Shape:
+    """All that any of the shapes covers."""
+    return _shapely.union_all(shapes)
+
+
+def difference(shape: Shape, without: Shape) -> Shape:
+    """What is left of a shape."""
+    return _shapely.difference(shape, without)
+
+
+def eroded(shape: Shape, distance: float) -> Shape:
+    """The places of a shape further than a distance from its boundary, with an error of up to 0.01 of the distance.
+
+    Short pieces of the boundary are widened one by one and taken away together: on the staircases of an occupancy grid
+    this is many times faster than to offset the polygon as a whole.
+    """
+    if not distance:
+        return shape
+    widened = _shapely.buffer(_boundary_pieces(shape), distance, quad_segs=_QUADRANT_CHORDS)
+    return _shapely.difference(shape, _shapely.union_all(widened))
+
+
+def _boundary_pieces(shape: Shape) -> ShapeArray:
+    """The boundary of a shape, cut into polylines of a few segments."""
+    corners, first, ring = _boundary_segments(shape)
+    starts_ring = np.r_[True, np.diff(ring) != 0]
+    since_ring_start = np.arange(len(first)) - np.flatnonzero(starts_ring)[np.cumsum(starts_ring) - 1]
+    piece = np.cumsum(starts_ring | (since_ring_start % _SEGMENTS_PER_PIECE == 0)) - 1
+    ends_piece = np.r_[np.diff(piece) != 0, True]
+    order = np.argsort(np.r_[piece, piece[ends_piece]], kind="stable")  # the last end of a piece after its starts
+    places = np.concatenate([corners[first], corners[first[ends_piece] + 1]])[order]
+    return _shapely.linestrings(places, indices=np.r_[piece, piece[ends_piece]][order])
+
+
+def _boundary_segments(shape: Shape) -> tuple[FloatArray, IntArray, IntArray]:
+    """Corners of the boundary, the index of the first corner of each segment, and the ring that the segment is of."""
+    corners, ring = _shapely.get_coordinates(_shapely.get_rings(_shapely.get_parts(shape)), return_index=True)
+    first = np.flatnonzero(ring[1:] == ring[:-1])
+    return corners, first, ring[first]
+
+
+def transformed(shape: Shape, function: Callable[[FloatArray], FloatArray]) -> Shape:
+    """The shape with its corners, shape (N, 2), moved by a function."""
+    return _shapely.transform(shape, function)
+
+
+def polygons(shape: Shape) -> list[Polygon]:
+    """The polygons with an area of which a shape consists."""
+    return [part for part in _shapely.get_parts(shape) if isinstance(part, Polygon) and part.area > 0]
+
+
+def holes(polygon: Polygon) -> ShapeArray:
+    """The holes of a polygon, each filled."""
+    return _shapely.polygons(_shapely.get_rings(polygon)[1:])
+
+
+def outline(shape: Shape, spacing: float) -> FloatArray:
+    """Corners of a shape, each once, and points between them at most `spacing` apart; shape (N, 2)."""
+    return np.unique(_shapely.get_coordinates(_shapely.segmentize(shape, spacing)), axis=0)
+
+
+def extent(shapes: Shape | ShapeArray) -> FloatArray:
+    """x_min, y_min, x_max, y_max of everything together, shape (4,)."""
+    return _shapely.total_bounds(shapes)
+
+
+def sizes(shapes: ShapeArray) -> FloatArray:
+    """Diagonal of the extent of each shape."""
+    x_min, y_min, x_max, y_max = _shapely.bounds(shapes).T
+    return np.hypot(x_max - x_min, y_max - y_min)
+
+
+def problem(shape: Shape) -> str:
+    """What makes a shape invalid; empty for a valid one."""
+    return "" if _shapely.is_valid(shape) else str(_shapely.is_valid_reason(shape))
+
+
+def points_within(shapes: ShapeArray) -> FloatArray:
+    """Some point in the interior of each polygon, shape (N, 2)."""
+    return _shapely.get_coordinates(_shapely.point_on_surface(shapes))
+
+
+def frechet_distance(waypoints: FloatArray, others: FloatArray) -> float:
+    """Discrete Fréchet distance of two polylines at the waypoints given, shapes (N, 2) and (M, 2)."""
+    return float(_shapely.frechet_distance(_shapely.linestrings(waypoints), _shapely.linestrings(others)))
+
+
+def nearest_part(shape: Shape, place: FloatArray) -> Polygon | None:
+    """The polygon of a shape that contains a place or is nearest to it; None where the shape has none."""
+    return min(polygons(shape), key=lambda part: float(part.distance(point(place))), default=None)
+
+
+class Region:
+    """An open region with its boundary, indexed for many queries.
+
+    Parameters
+    ----------
+    shape
+        Polygon or multipolygon.
+    """
+
+    def __init__(self, shape: Polygon | MultiPolygon) -> None:
+        self._shape = shape
+        self._boundary = _shapely.boundary(shape)
+        _shapely.prepare((self._shape, self._boundary))
+
+    @cached_property
+    def _segments(self) -> Any:
+        corners, first, _ = _boundary_segments(self._shape)
+        return cast("Any", shapely.STRtree)(segments(corners[first], corners[first + 1]))
+
+    def contains(self, points: FloatArray) -> BoolArray:
+        """Whether each point, shape (N, 2), lies inside and not on the boundary."""
+        return _shapely.contains_xy(self._shape, points[:, 0], points[:, 1])
+
+    def boundary_distances(self, points: FloatArray) -> FloatArray:
+        """Distance of each point, shape (N, 2), to the boundary."""
+        return self._segments.query_nearest(_shapely.points(points), return_distance=True, all_matches=False)[1]
+
+    def boundary_near(self, starts: FloatArray, ends: FloatArray, distance: float) -> BoolArray:
+        """Whether each segment, shapes (N, 2), comes within a distance of the boundary, or exactly to it."""
+        return _shapely.dwithin(self._boundary, segments(starts, ends), distance)

@@ -1,0 +1,133 @@
+"""Bad input: exit code 2, exactly one line on stderr that says what to do, and no file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from topobelief.cli.app import BAD_INPUT
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.io.g2o import write_g2o
+
+DISCONNECTED = """VERTEX_SE2 7 0 0 0
+VERTEX_SE2 8 1 0 0
+VERTEX_SE2 9 5 0 0
+EDGE_SE2 7 8 1 0 0 1 0 0 1 0 1
+"""
+
+
+def one_line(outcome) -> str:
+    assert outcome.code == BAD_INPUT
+    assert outcome.err.startswith("topobelief: ")
+    assert outcome.err.count("\n") == 1
+    return outcome.err
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Path:
+    """A folder of graphs that are none."""
+    (tmp_path / "empty.g2o").touch()
+    (tmp_path / "binary.g2o").write_bytes(b"VERTEX_SE2\0\x01\x02")
+    (tmp_path / "folder.g2o").mkdir()
+    (tmp_path / "disconnected.g2o").write_text(DISCONNECTED)
+    (tmp_path / "islands.g2o").write_text("EDGE_SE2 1 2 1 0 0 1 0 0 1 0 1\nEDGE_SE2 3 4 1 0 0 1 0 0 1 0 1\n")
+    (tmp_path / "truncated.g2o").write_text("VERTEX_SE2 0 0 0 0\nEDGE_SE2 0 1 1 0\n")
+    return tmp_path
+
+
+@pytest.mark.parametrize("command", [["info"], ["plan", "--along-trajectory", "--goal", "1", "2"]], ids=["info", "plan"])
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("missing.g2o", "nothing of that name"),
+        ("empty.g2o", "got an empty one"),
+        ("binary.g2o", "got a binary one"),
+        ("folder.g2o", "got a directory"),
+        ("truncated.g2o", "truncated.g2o:2: expected"),
+        ("disconnected.g2o", "disconnected.g2o: expected a connected graph, got 1 node(s) that node 7 does not reach: 9"),
+        ("islands.g2o", "islands.g2o: "),
+        ("graph.txt", "expected a name that ends in .g2o"),
+    ],
+)
+def test_graph_files_that_are_wrong(topobelief, files, command, name, message):
+    outcome = topobelief([command[0], str(files / name), *command[1:]])
+    assert message in one_line(outcome)
+    assert outcome.out == ""
+
+
+@pytest.mark.parametrize(
+    ("goal", "message"),
+    [
+        (("50", "5"), "expected a goal on the map"),
+        (("5", "5"), "got (5, 5), in an obstacle"),
+        (("10", "-0.7"), "got (10, -0.7), 0.10 m from the nearest obstacle"),
+        (("nan", "5"), "expected two finite numbers"),
+    ],
+)
+def test_goals_that_cannot_be(topobelief, office, goal, message):
+    arguments = ["plan", str(office.graph_file), "--map", str(office.map_file), "--goal", *goal]
+    assert message in one_line(topobelief(arguments))
+
+
+def test_a_goal_behind_walls(topobelief, office, tmp_path):
+    closed = tmp_path / "closed.csv"
+    closed.write_text(office.map_file.read_text() + "-1,7,11,7.2\n")
+    message = one_line(topobelief(["plan", str(office.graph_file), "--map", str(closed), "--goal", "0", "5"]))
+    assert "walls separate them" in message
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--spacing", "-1"], "'--spacing': expected a number above 0, got -1"),
+        (["--spacing", "nan"], "'--spacing': expected a number above 0, got nan"),
+        (["--robot-radius", "0"], "'--robot-radius': expected a number above 0, got 0"),
+        (["--candidates", "0"], "'--candidates'"),
+        (["--candidates", "many"], "'--candidates'"),
+        (["--max-detour", "0.5"], "'--max-detour': expected a factor of at least 1"),
+        (["--max-detour", "far"], "'--max-detour': expected a factor of at least 1"),
+        (["--closure-angle", "4"], "expected closure_angle above 0 and at most 3.14159"),
+        (["--objective", "fame"], "'--objective'"),
+        (["--proof", "optimal", "--margin", "-50"], "expected a margin or proof"),
+        (["--sigma-p", "0.1"], "expected both --sigma-p and --sigma-theta or neither"),
+        (["--bounds", "paper", "--sigma-p", "1", "--sigma-theta", "1"], 'use bounds="fischer"'),
+        (["--along-trajectory"], "expected one of --map FILE and --along-trajectory"),
+        (["--bogus"], "No such option: --bogus"),
+    ],
+)
+def test_options_that_make_no_sense(topobelief, office, tmp_path, options, message):
+    assert message in one_line(topobelief(office.plan("--out", "result", *options)))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_no_world_at_all(topobelief, office):
+    message = one_line(topobelief(["plan", str(office.graph_file), "--goal", "0", "5"]))
+    assert "expected one of --map FILE and --along-trajectory" in message
+
+
+@pytest.mark.parametrize(("name", "message"), [("gone.yaml", "nothing of that name"), ("map.png", "expected a map that ends")])
+def test_maps_that_are_none(topobelief, office, name, message):
+    assert message in one_line(topobelief(["plan", str(office.graph_file), "--map", name, "--goal", "0", "5"]))
+
+
+@pytest.mark.parametrize("out", ["taken", "taken/below"])
+def test_a_file_where_the_folder_should_be_is_noticed_before_the_work(topobelief, office, tmp_path, out):
+    (tmp_path / "taken").write_text("mine")
+    outcome = topobelief(office.plan("--out", tmp_path / out))
+    assert "expected a folder to write to, got a file" in one_line(outcome)
+    assert outcome.out == ""
+    assert (tmp_path / "taken").read_text() == "mine"
+
+
+def test_a_graph_in_space_cannot_be_planned_on_in_the_plane(topobelief, office, tmp_path):
+    poses = np.array([[0, 0, 0, 0, 0, 0, 1], [1, 0, 0, 0, 0, 0, 1]])
+    write_g2o(PoseGraph(poses, [(0, 1)], None, np.eye(6)), tmp_path / "space.g2o")
+    arguments = ["plan", str(tmp_path / "space.g2o"), "--map", str(office.map_file), "--goal", "0", "5"]
+    assert "expected a graph in SE(2) to plan in the plane, got one in SE(3)" in one_line(topobelief(arguments))
+
+
+@pytest.mark.parametrize("arguments", [["fly"], ["plan"], ["info", "a.g2o", "b.g2o"]])
+def test_commands_that_are_none_or_incomplete(topobelief, arguments):
+    assert "--help`" in one_line(topobelief(arguments))

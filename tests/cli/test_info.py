@@ -1,0 +1,98 @@
+"""`info` prints what the library computes."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from data_files import data_file
+from topobelief.bounds import entropy_bounds
+from topobelief.cli import graph_facts
+from topobelief.entropy import joint_entropy
+from topobelief.estimation import optimize
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.io.g2o import read_g2o, write_g2o
+from topobelief.signatures.spanning_trees import log_num_spanning_trees, spanning_tree_signature
+from topobelief.signatures.von_neumann import von_neumann_entropy, von_neumann_entropy_approx
+
+
+def facts(topobelief, *arguments: object) -> dict:
+    outcome = topobelief(["info", *map(str, arguments), "--json"])
+    assert outcome.code == 0
+    assert outcome.err == ""
+    return json.loads(outcome.out)
+
+
+def test_quantities_are_those_of_the_library_at_the_optimised_poses(topobelief, office):
+    found = facts(topobelief, office.graph_file)
+    graph = optimize(read_g2o(office.graph_file))
+    bounds = entropy_bounds(graph, family="paper", determinant="hadamard")
+    assert found["joint_entropy"] == joint_entropy(graph)
+    assert found["bounds_paper_hadamard"] == {"lower": bounds.lower, "upper": bounds.upper}
+    assert found["log_num_spanning_trees"] == log_num_spanning_trees(graph.topology)
+    assert found["spanning_tree_signature"] == spanning_tree_signature(graph.topology, graph.information)
+    assert found["von_neumann_entropy"] == von_neumann_entropy(graph.topology)
+    assert found["von_neumann_entropy_approx"] == von_neumann_entropy_approx(graph.topology)
+    assert found["chi2_per_dof_optimized"] == graph.chi2 / graph.degrees_of_freedom
+    assert found["chi2_per_dof_optimized"] < found["chi2_per_dof_filed"]
+
+
+def test_sizes_are_counted(topobelief, tmp_path):
+    """Two parallel edges, one closure over three poses, one of them fixed; ids are those of the file."""
+    poses = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0]])
+    edges = [(0, 1), (1, 2), (0, 2), (1, 2)]
+    write_g2o(PoseGraph(poses, edges, None, np.eye(3), ids=[10, 20, 30], fixed=(1,)), tmp_path / "small.g2o")
+    found = facts(topobelief, tmp_path / "small.g2o")
+    expected = {
+        "space": "SE(2)",
+        "num_poses": 3,
+        "num_edges": 4,
+        "num_loop_closures": 1,
+        "num_parallel_edges": 1,
+        "fixed": [20],
+    }
+    expected |= {"mean_degree": 8 / 3, "max_degree": 3, "num_components": 1, "degrees_of_freedom": 6, "length": 2.0}
+    assert {name: found[name] for name in expected} == expected
+
+
+def test_poses_as_filed_are_judged_on_request(topobelief, office):
+    found = facts(topobelief, office.graph_file, "--no-optimize")
+    assert found["joint_entropy"] == joint_entropy(read_g2o(office.graph_file))
+    assert "chi2_per_dof_optimized" not in found
+
+
+def test_a_tree_fits_perfectly_and_has_no_degrees_of_freedom(topobelief, tmp_path):
+    chain = PoseGraph([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [(0, 1), (1, 2)], None, np.eye(3))
+    write_g2o(chain, tmp_path / "chain.g2o")
+    found = facts(topobelief, tmp_path / "chain.g2o")
+    assert found["degrees_of_freedom"] == 0
+    assert found["chi2_per_dof_filed"] is None
+    assert found["bounds_fischer_cholesky"]["upper"] == pytest.approx(found["joint_entropy"], abs=1e-9)
+
+
+def test_a_single_pose_is_described(topobelief, tmp_path):
+    (tmp_path / "one.g2o").write_text("VERTEX_SE2 5 1 2 0\n")
+    found = facts(topobelief, tmp_path / "one.g2o")
+    assert (found["num_poses"], found["num_edges"], found["joint_entropy"]) == (1, 0, 0.0)
+
+
+def test_the_paper_bounds_say_where_they_do_not_apply(topobelief, tmp_path):
+    noise = np.array([np.eye(3), 2 * np.eye(3)])
+    write_g2o(PoseGraph([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [(0, 1), (1, 2)], None, noise), tmp_path / "mixed.g2o")
+    assert facts(topobelief, tmp_path / "mixed.g2o")["bounds_paper_cholesky"] is None
+    assert "do not apply: they need one block-isotropic noise" in topobelief(["info", str(tmp_path / "mixed.g2o")]).out
+
+
+def test_a_dense_spectrum_that_would_take_long_is_priced_instead(topobelief, office, monkeypatch):
+    monkeypatch.setattr(graph_facts, "DENSE_SPECTRUM_SIZE", 20)
+    assert facts(topobelief, office.graph_file)["von_neumann_entropy"] is None
+    assert "s for the spectrum of 21 poses" in topobelief(["info", str(office.graph_file)]).out
+
+
+def test_graphs_in_space_are_described_too(topobelief):
+    outcome = topobelief(["info", str(data_file("smallGrid3D.g2o"))])
+    assert outcome.code == 0
+    assert "SE(3)" in outcome.out
+    assert "its bounds, fischer, cholesky" in outcome.out

@@ -1,0 +1,230 @@
+"""`plan` says and writes what the library decides."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from data_files import data_file
+from topobelief.candidates.diverse_paths import diverse_paths
+from topobelief.candidates.predicted_factors import predict_actions
+from topobelief.candidates.roadmap import build_roadmap
+from topobelief.cli import plan_files, plan_stages
+from topobelief.cli.console import Reporter
+from topobelief.entropy import joint_entropy
+from topobelief.errors import FileError
+from topobelief.estimation import optimize
+from topobelief.graph.action import posterior
+from topobelief.io.floor_plan import read_world
+from topobelief.io.g2o import read_g2o
+from topobelief.planning.decision import Candidate, Decision
+from topobelief.planning.planner import Planner
+
+PICTURES = {"paths.png", "bounds.png"}
+
+
+@pytest.fixture(scope="module")
+def by_hand(office):
+    """The same plan through the library: graph, world, paths, actions and decision."""
+    graph = optimize(read_g2o(office.graph_file))
+    world = read_world(office.map_file)
+    start, goal = graph.positions[-1], (0.0, 5.0)
+    roadmap = build_roadmap(world, start, goal, num_vertices=200, robot_radius=0.35, seed=0)
+    paths = diverse_paths(roadmap, start, goal, num_paths=6, max_detour=1.3, seed=0)
+    actions = predict_actions(graph, paths, world=world)
+    return graph, paths, actions, Planner(graph).decide(actions)
+
+
+def document(topobelief, arguments: list[str]) -> dict:
+    outcome = topobelief([*arguments, "--json"])
+    assert outcome.code == 0
+    assert outcome.err == ""
+    return json.loads(outcome.out)
+
+
+def test_the_decision_is_that_of_the_library(topobelief, office, by_hand):
+    plan = document(topobelief, office.plan("--candidates", 6))
+    _, paths, _, decision = by_hand
+    assert Decision.from_dict(plan).to_dict() == decision.to_dict()
+    assert [action["waypoints"] for action in plan["actions"]] == [path.tolist() for path in paths]
+
+
+def test_the_answer_comes_in_words_then_as_a_table_then_where_the_pictures_are(topobelief, office, by_hand):
+    outcome = topobelief(office.plan("--candidates", 6))
+    decision = by_hand[3]
+    places = [outcome.out.index(text) for text in (decision.summary(), "signature", "Pictures: out/paths.png")]
+    assert outcome.code == 0
+    assert places == sorted(places)
+    assert outcome.err == ""
+
+
+def test_three_files_are_written_and_the_decision_reads_back(topobelief, office, tmp_path, by_hand):
+    assert topobelief(office.plan("--candidates", 6, "--out", "a/b")).code == 0
+    folder = tmp_path / "a" / "b"
+    assert {path.name for path in folder.iterdir()} == PICTURES | {"decision.json"}
+    assert all((folder / name).read_bytes().startswith(b"\x89PNG") for name in PICTURES)
+    decision = Decision.from_dict(json.loads((folder / "decision.json").read_text()))
+    assert decision.to_dict() == by_hand[3].to_dict()
+
+
+def test_the_same_arguments_give_the_same_bytes(topobelief, office, tmp_path):
+    for _ in range(2):
+        topobelief(office.plan("--candidates", 3, "--out", "out"))
+        (tmp_path / "out").rename(tmp_path / f"out{len(list(tmp_path.iterdir()))}")
+    first, second = sorted(tmp_path.iterdir())
+    for name in (*PICTURES, "decision.json"):
+        assert (first / name).read_bytes() == (second / name).read_bytes()
+
+
+def test_for_a_program_no_file_is_written_unless_a_folder_is_named(topobelief, office, tmp_path):
+    document(topobelief, office.plan("--candidates", 2))
+    assert list(tmp_path.iterdir()) == []
+    document(topobelief, office.plan("--candidates", 2, "--out", "here"))
+    assert (tmp_path / "here" / "decision.json").exists()
+
+
+def test_exact_values_stand_apart_from_the_decision_that_did_not_need_them(topobelief, office, tmp_path, by_hand):
+    topobelief(office.plan("--candidates", 6))
+    written = json.loads((tmp_path / "out" / "decision.json").read_text())
+    graph, _, actions, _ = by_hand
+    assert written["num_evaluations"] == 0
+    for row, action in zip(written["actions"], actions, strict=True):
+        assert row["entropy"] == "nan"
+        assert row["exact_for_comparison"] == pytest.approx(joint_entropy(posterior(graph, action)), abs=1e-6)
+
+
+def test_without_exact_values_none_is_computed(topobelief, office, tmp_path):
+    topobelief(office.plan("--candidates", 2, "--no-exact"))
+    written = json.loads((tmp_path / "out" / "decision.json").read_text())
+    assert [action["exact_for_comparison"] for action in written["actions"]] == [None, None]
+
+
+def test_exact_values_stop_when_their_time_is_over(by_hand, monkeypatch, capsys):
+    """In ranking order, and the output says how many there are."""
+    graph, _, actions, decision = by_hand
+    monkeypatch.setattr(plan_stages, "EXACT_SECONDS", 0.0)
+    ticks = iter([0.0, 0.0, 0.0, 1.0])
+    monkeypatch.setattr(plan_stages, "monotonic", lambda: next(ticks))
+    values = plan_stages.exact_entropies(Planner(graph), actions, decision, Reporter(as_json=False), wanted=True)
+    assert np.flatnonzero(~np.isnan(values)).tolist() == sorted(decision.ranking[:2].tolist())
+    assert "the first 2 of the ranking" in capsys.readouterr().out
+
+
+def test_the_paper_rule_is_one_option_and_gives_way_to_others(topobelief, office):
+    names = ("closure_angle", "min_index_gap", "line_of_sight", "max_detour")
+
+    def settings(*options: object) -> tuple:
+        chosen = document(topobelief, office.plan("--candidates", 2, "--proof", "none", *options))["options"]
+        return tuple(chosen[name] for name in names)
+
+    assert settings() == (math.pi, 5, True, 1.3)
+    assert settings("--paper") == (1.0, 2, False, None)
+    assert settings("--paper", "--min-index-gap", 4, "--line-of-sight", "--max-detour", 2) == (1.0, 4, True, 2.0)
+    assert settings("--max-detour", "none") == (math.pi, 5, True, None)
+
+
+def test_the_noise_of_predicted_factors_can_be_given(topobelief, office):
+    plan = document(topobelief, office.plan("--candidates", 2, "--sigma-p", 0.1, "--sigma-theta", 0.05))
+    assert np.allclose(plan["options"]["information"], np.diag([100, 100, 400]))
+    better = document(topobelief, office.plan("--candidates", 2, "--sigma-p", 0.01, "--sigma-theta", 0.05))
+    assert better["actions"][0]["upper"] < plan["actions"][0]["upper"]
+
+
+def test_optimal_is_proven_and_a_margin_is_judged(topobelief, office):
+    assert document(topobelief, office.plan("--candidates", 6, "--proof", "optimal"))["proven_optimal"] is True
+    assert document(topobelief, office.plan("--candidates", 6, "--margin", 1e9))["margin_met"] is True
+    assert document(topobelief, office.plan("--candidates", 6, "--margin", -1e9))["margin_met"] is False
+
+
+@pytest.mark.parametrize(
+    "choice",
+    [
+        ("--objective", "map"),
+        ("--objective", "per_pose"),
+        ("--signature", "von_neumann"),
+        ("--signature", "von_neumann_approx", "--normalized"),
+        ("--bounds", "paper", "--determinant", "hadamard"),
+        ("--proof", "none"),
+    ],
+)
+def test_every_choice_is_planned_on_and_drawn(topobelief, office, choice):
+    outcome = topobelief(office.plan("--candidates", 3, *choice))
+    assert (outcome.code, outcome.err) == (0, "")
+
+
+def test_poses_as_filed_are_kept_on_request(topobelief, office):
+    filed = document(topobelief, office.plan("--candidates", 2, "--no-optimize"))
+    optimised = document(topobelief, office.plan("--candidates", 2))
+    assert filed["start"] == office.graph.poses[-1].tolist()
+    assert optimised["graph"]["chi2"] < filed["graph"]["chi2"]
+
+
+def test_a_graph_without_a_map_is_planned_on_along_its_trajectory(topobelief, tmp_path):
+    csail = data_file("csail.g2o")
+    outcome = topobelief(["plan", str(csail), "--along-trajectory", "--goal", "20", "-10", "--candidates", "5"])
+    assert outcome.code == 0
+    assert "world: within 0.92 m of the trajectory" in outcome.out
+    assert {path.name for path in (tmp_path / "out").iterdir()} == PICTURES | {"decision.json"}
+
+
+def test_files_are_written_together_or_not_at_all(tmp_path):
+    """A failure in the last leaves the first as it was, and no temporary file."""
+    (tmp_path / "first").write_text("old")
+
+    def fails(_: Path) -> None:
+        raise OSError(28, "No space left on device")
+
+    with pytest.raises(FileError, match="second: expected a file to write, got a system error: No space left"):
+        plan_files.write_together(tmp_path, {"first": lambda path: path.write_text("new"), "second": fails})
+    assert (tmp_path / "first").read_text() == "old"
+    assert [path.name for path in tmp_path.iterdir()] == ["first"]
+
+
+def decision_of(poses: list[int], objective: str = "joint") -> Decision:
+    """Actions with so many new poses, ranked as listed."""
+    count = len(poses)
+    nothing = np.zeros(count)
+    return Decision(
+        best=0,
+        ranking=np.arange(count),
+        signatures=nothing,
+        lower=nothing,
+        upper=nothing,
+        entropies=nothing,
+        survivors=np.arange(count),
+        error_bound=0.0,
+        margin_met=None,
+        num_evaluations=0,
+        proven_optimal=False,
+        candidates=tuple(Candidate("", number, 0, float(number), 0.0) for number in poses),
+        objective=objective,
+        signature="spanning_trees",
+        bounds="fischer",
+        determinant="cholesky",
+    )
+
+
+def test_a_ranking_that_counts_poses_is_called_so():
+    hint = plan_stages.length_bias_hint(decision_of([20, 18, 16, 14, 12, 13]))
+    assert hint is not None
+    assert "rank correlation 0.94" in hint
+    assert "--objective map" in hint
+    assert "\n" not in hint
+
+
+@pytest.mark.parametrize(
+    "decision",
+    [
+        decision_of([12, 13, 14, 16, 18, 20]),  # the shortest first
+        decision_of([20, 12, 18, 13, 16, 14]),
+        decision_of([20] * 6),
+        decision_of([20, 18, 16]),  # too few to say
+        decision_of([20, 18, 16, 14, 12, 13], objective="map"),
+    ],
+)
+def test_other_rankings_are_not(decision):
+    assert plan_stages.length_bias_hint(decision) is None

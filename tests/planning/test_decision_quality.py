@@ -1,0 +1,135 @@
+"""Definition 1: epsilon and gamma in closed form against a linear program, consistency, and correlations."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
+from scipy.optimize import linprog
+
+from topobelief.errors import InvalidInputError
+from topobelief.planning.decision_quality import decision_quality, rank_correlation
+
+values = st.lists(
+    st.tuples(
+        st.one_of(st.integers(-4, 4).map(float), st.floats(-50, 50)),
+        st.one_of(st.integers(-3, 3).map(float), st.floats(-50, 50)),
+    ),
+    min_size=1,
+    max_size=9,
+)
+
+
+def gamma_by_linear_program(J, s):
+    """min over f, decreasing in s and pinned at the largest s, of max |J - f(s)|."""
+    K, chosen = len(J), int(np.argmax(s))
+    rows, limits = [], []
+    for a in range(K):
+        fit = np.zeros(K + 1)
+        fit[[a, K]] = 1, -1
+        rows += [fit, np.where(np.arange(K + 1) == K, -1.0, -fit)]
+        limits += [J[a], -J[a]]
+        for b in range(K):
+            if a != b and s[a] >= s[b]:  # f(s_a) <= f(s_b); ties both ways
+                order = np.zeros(K + 1)
+                order[[a, b]] = 1, -1
+                rows.append(order)
+                limits.append(0.0)
+    pin = np.zeros((1, K + 1))
+    pin[0, chosen] = 1
+    cost = np.zeros(K + 1)
+    cost[K] = 1
+    solution = linprog(
+        cost,
+        A_ub=np.array(rows),
+        b_ub=limits,
+        A_eq=pin,
+        b_eq=[J[chosen]],
+        bounds=[(None, None)] * K + [(0, None)],
+        method="highs",
+    )
+    assert solution.status == 0
+    return solution.fun
+
+
+@given(values)
+def test_gamma_is_the_minimax_monotone_fit(pairs):
+    J, s = np.array(pairs).T
+    quality = decision_quality(J, s)
+    assert quality.gamma == pytest.approx(gamma_by_linear_program(J, s), abs=1e-6)
+    assert quality.error == pytest.approx(J[np.argmax(s)] - J.min(), abs=1e-12)
+    assert quality.error <= quality.gamma + 1e-12  # the pinned point is too high by epsilon for U*
+    assert quality.action_consistent == (quality.error <= 1e-12 * np.abs(J).max())
+    assert quality.order_consistent == (quality.gamma <= 1e-12 * np.abs(J).max())
+
+
+@given(values, st.floats(0.1, 10), st.floats(-5, 5))
+def test_quality_sees_the_order_of_signatures_only(pairs, slope, offset):
+    J, s = np.array(pairs).T
+    order = np.unique(s, return_inverse=True)[1]
+    before, after = decision_quality(J, s), decision_quality(J, slope * order + offset)
+    assert (before.error, before.gamma) == (after.error, after.gamma)
+    shifted = decision_quality(J + 7, s)
+    assert (shifted.error, shifted.gamma) == (pytest.approx(before.error, abs=1e-12), pytest.approx(before.gamma, abs=1e-12))
+
+
+@given(values)
+def test_correlations_are_those_of_scipy_between_J_and_minus_s(pairs):
+    J, s = np.array(pairs).T
+    quality = decision_quality(J, s)
+    if len(J) < 2 or np.ptp(J) == 0 or np.ptp(s) == 0:
+        assert all(math.isnan(value) for value in (quality.spearman, quality.kendall, quality.pearson))
+        return
+    assert quality.spearman == pytest.approx(stats.spearmanr(J, -s).statistic, abs=1e-12)
+    assert quality.kendall == pytest.approx(stats.kendalltau(J, -s).statistic, abs=1e-12)
+    if np.ptp(J) > 1e-6 and np.ptp(s) > 1e-6:
+        assert quality.pearson == pytest.approx(stats.pearsonr(J, -s).statistic, abs=1e-9)
+
+
+def test_a_perfect_signature():
+    J = np.array([3.0, 1.0, 2.0, -5.0])
+    quality = decision_quality(J, -J)
+    assert (quality.error, quality.gamma, quality.action_consistent, quality.order_consistent) == (0, 0, True, True)
+    assert (quality.spearman, quality.kendall) == (1, 1)
+    assert quality.pearson == pytest.approx(1)
+
+
+def test_a_swap_among_losers_costs_half_of_it_and_one_with_the_winner_the_whole():
+    assert decision_quality([0, 10, 6], [3, 2, 1]).gamma == 2  # f meets 10 and 6 half-way
+    assert decision_quality([0, 10, 6], [3, 2, 1]).action_consistent
+    swapped = decision_quality([4, 0, 10], [3, 2, 1])  # f(s of the first) = 4 stays above the second's 0
+    assert (swapped.error, swapped.gamma, swapped.action_consistent) == (4, 4, False)
+
+
+def test_ties_of_the_chosen_are_pinned_too():
+    quality = decision_quality([1.0, 5.0, 9.0], [2.0, 2.0, 1.0])
+    assert (quality.error, quality.gamma) == (0, 4)
+
+
+def test_one_action_is_consistent():
+    quality = decision_quality([-7.0], [3.0])
+    assert (quality.error, quality.gamma, quality.action_consistent, quality.order_consistent) == (0, 0, True, True)
+    assert math.isnan(quality.spearman)
+
+
+def test_rank_correlation_of_a_constant_is_nan():
+    assert rank_correlation([1, 2, 3], [10, 20, 15]) == pytest.approx(0.5)
+    assert math.isnan(rank_correlation([1, 1, 1], [1, 2, 3]))
+    assert math.isnan(rank_correlation([1], [2]))
+
+
+@pytest.mark.parametrize(
+    ("J", "s", "message"),
+    [
+        ([], [], r"of one shape \(K,\), K >= 1, got \(0,\) and \(0,\)"),
+        ([1.0], [1.0, 2.0], r"got \(1,\) and \(2,\)"),
+        ([[1.0]], [[1.0]], r"got \(1, 1\) and \(1, 1\)"),
+        ([1.0, math.nan], [1.0, 2.0], "got nan or inf; evaluate every action first"),
+        ([1.0, 2.0], [1.0, math.inf], "got nan or inf; evaluate every action first"),
+    ],
+)
+def test_bad_input_is_refused(J, s, message):
+    with pytest.raises(InvalidInputError, match=message):
+        decision_quality(J, s)
