@@ -72,12 +72,12 @@ def joint_entropy_estimate(graph: PoseGraph, *, anchor: int = 0) -> EntropyEstim
     return EntropyEstimate(entropy.value, entropy.error)
 
 
-def entropy_of(log_det: LogDet, num_free: int, tangent_dim: int) -> LogDet:
-    """Entropy of `num_free` poses whose information has this log-determinant, with its error.
+def entropy_of(log_det: LogDet, num_free: int, tangent_dim: int, *, what: str = "joint entropy") -> LogDet:
+    """Entropy of `num_free` poses whose information has this log-determinant, with its error; errors call it `what`.
 
     Raises
     ------
     IllConditionedError
         If the error exceeds 0.1 nats.
     """
-    return (-0.5 * log_det).plus(num_free * tangent_dim / 2 * LOG_2_PI_E).require_accuracy("joint entropy")
+    return (-0.5 * log_det).plus(num_free * tangent_dim / 2 * LOG_2_PI_E).require_accuracy(what)

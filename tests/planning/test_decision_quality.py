@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 from scipy.optimize import linprog
@@ -12,14 +12,8 @@ from scipy.optimize import linprog
 from topobelief.errors import InvalidInputError
 from topobelief.planning.decision_quality import decision_quality, rank_correlation
 
-values = st.lists(
-    st.tuples(
-        st.one_of(st.integers(-4, 4).map(float), st.floats(-50, 50)),
-        st.one_of(st.integers(-3, 3).map(float), st.floats(-50, 50)),
-    ),
-    min_size=1,
-    max_size=9,
-)
+numbers = st.one_of(st.integers(-4, 4).map(float), st.floats(-50, 50).map(lambda value: round(value, 6)))
+values = st.lists(st.tuples(numbers, numbers), min_size=1, max_size=9)
 
 
 def gamma_by_linear_program(J, s):
@@ -54,6 +48,7 @@ def gamma_by_linear_program(J, s):
     return solution.fun
 
 
+@settings(max_examples=150)
 @given(values)
 def test_gamma_is_the_minimax_monotone_fit(pairs):
     J, s = np.array(pairs).T
@@ -106,6 +101,20 @@ def test_a_swap_among_losers_costs_half_of_it_and_one_with_the_winner_the_whole(
 def test_ties_of_the_chosen_are_pinned_too():
     quality = decision_quality([1.0, 5.0, 9.0], [2.0, 2.0, 1.0])
     assert (quality.error, quality.gamma) == (0, 4)
+
+
+def test_ties_among_losers_meet_half_way():
+    """One signature, two entropies: f takes the middle, in whatever order they are listed."""
+    for J in ([0.0, 3.0, 9.0], [0.0, 9.0, 3.0]):
+        assert decision_quality(J, [5.0, 1.0, 1.0]).gamma == 3
+
+
+@pytest.mark.parametrize("unit", [1e-290, 1e-160, 1e160, 1e290])
+def test_correlations_do_not_depend_on_the_unit_of_a_signature(unit):
+    """Squares of tiny or huge numbers vanish or overflow; a correlation does not."""
+    quality = decision_quality([0.0, 1.0, 5.0], [-unit * value for value in (0.0, 2.0, 3.0)])
+    assert quality.pearson == pytest.approx(stats.pearsonr([0, 1, 5], [0, 2, 3]).statistic)
+    assert (quality.spearman, quality.kendall) == (pytest.approx(1), pytest.approx(1))
 
 
 def test_one_action_is_consistent():

@@ -57,7 +57,7 @@ def entropy_bounds(
     Returns
     -------
     Bounds
-        Nats; `lower <= joint_entropy(graph) <= upper`.
+        Nats; `lower <= J <= upper` for the true J, to whose rounding error `joint_entropy` is known too.
 
     Raises
     ------
@@ -74,8 +74,8 @@ def entropy_bounds(
     graph.topology.require_connected(anchor=anchor, names=graph.ids)
     solver = LogDetSolver(graph.edges, graph.num_poses, anchor)
     bounds = log_det_bounds(fisher_rows(graph), solver, family=family, determinant=determinant)
-    upper = entropy_of(bounds.lower, graph.num_poses - 1, graph.tangent_dim)
-    lower = entropy_of(bounds.upper, graph.num_poses - 1, graph.tangent_dim)
+    upper = entropy_of(bounds.lower, graph.num_poses - 1, graph.tangent_dim, what="bound of the joint entropy")
+    lower = entropy_of(bounds.upper, graph.num_poses - 1, graph.tangent_dim, what="bound of the joint entropy")
     return Bounds(lower.value - lower.error, upper.value + upper.error)
 
 

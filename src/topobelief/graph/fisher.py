@@ -19,10 +19,13 @@ import numpy as np
 
 from topobelief.arrays import FloatArray, IntArray
 from topobelief.geometry import Group
-from topobelief.graph.information import SAME_NOISE, isotropic_weights
+from topobelief.graph.information import SAME_NOISE, isotropic_weights, shared_information
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg.edge_form import EdgeForm, laplacian_form
 from topobelief.linalg.log_det import UNIT_ROUNDOFF
+
+
+_may_overflow = np.errstate(over="ignore", invalid="ignore")  # log-determinants of what is not finite are refused
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +40,7 @@ class FisherRows:
     root_error: float
     weights: tuple[FloatArray, FloatArray] | None  # (w_p, w_r) where all noise is block-isotropic
 
+    @_may_overflow
     def joint(self) -> EdgeForm:
         """I: kappa variables a pose."""
         k, root = self.group.position_dim, self.root
@@ -103,11 +107,13 @@ class FisherRows:
         ratios = self.weights[1] / self.weights[0]
         return float(ratios[0]) if np.ptp(ratios) <= SAME_NOISE * ratios[0] else None
 
+    @_may_overflow
     def squared_lengths(self) -> FloatArray:
         """|d|^2, shape (m,): |C(d)|^2 counts it once in SE(2) and twice in SE(3)."""
         return np.sum(self.lever**2, axis=(1, 2)) / max(1, self.group.rotation_dim - 1)
 
 
+@_may_overflow
 def fisher_rows(graph: PoseGraph, *, first_edge: int = 0) -> FisherRows:
     """Rows of a graph's edges at its poses, from `first_edge` on."""
     group, information, edges = graph.group, graph.information[first_edge:], graph.edges[first_edge:]
@@ -129,7 +135,23 @@ def fisher_rows(graph: PoseGraph, *, first_edge: int = 0) -> FisherRows:
         if group.rotation_dim == k:
             turn[:, k:, k:] = turn[:, :k, :k]
         root = upper @ turn
-        pivots = np.diagonal(upper, axis1=1, axis2=2)
-        root_error = UNIT_ROUNDOFF * kappa**2 * float(np.sum(diagonal / pivots**2))
+        root_error = _root_error(information)
     traces = np.stack([diagonal[:, :k].sum(axis=1), diagonal[:, k:].sum(axis=1)], axis=1)
     return FisherRows(group, edges, root, group.lever(offset), np.sqrt(traces), root_error, weights)
+
+
+def _root_error(information: FloatArray) -> float:
+    """What rounding in the roots of the noise adds to the error of a log-determinant, nats.
+
+    A root is that of Omega + E with |E_ij| <= kappa u sqrt(Omega_ii Omega_jj), which moves ln |Omega| by tr(Omega^-1 E).
+    """
+    if shared_information(information) is not None:
+        return len(information) * _root_error_terms(information[:1])
+    return _root_error_terms(information)
+
+
+def _root_error_terms(information: FloatArray) -> float:
+    scale = 1 / np.sqrt(np.diagonal(information, axis1=1, axis2=2))
+    inverse = np.linalg.inv(information * scale[:, :, None] * scale[:, None, :])
+    deviations = np.sqrt(np.abs(np.diagonal(inverse, axis1=1, axis2=2)))
+    return UNIT_ROUNDOFF * information.shape[-1] * float(np.sum(deviations.sum(axis=1) ** 2))

@@ -77,6 +77,10 @@ class LogDet:
         return LogDet(value, self.error + UNIT_ROUNDOFF * (abs(constant) + abs(self.value) + abs(value)))
 
 
+_UNKNOWN = LogDet(math.nan, math.inf)
+_may_overflow = np.errstate(over="ignore", divide="ignore", invalid="ignore")  # what is not finite has an infinite error
+
+
 class LogDetSolver:
     """Log-determinants of forms on one graph with one set of held nodes; ordering and symbolic factor are reused.
 
@@ -100,6 +104,7 @@ class LogDetSolver:
         """Nodes that are not held."""
         return int(self._free.sum())
 
+    @_may_overflow
     def log_det(self, form: EdgeForm, *, shift: float = 0.0) -> LogDet:
         """ln det of the form's matrix plus `shift` times I, on the free nodes.
 
@@ -124,6 +129,7 @@ class LogDetSolver:
         elsewhere = LogDetSolver(self._edges, len(self._free), form.strongest_node()).log_det(form)
         return min(here, elsewhere, key=lambda candidate: candidate.error)
 
+    @_may_overflow
     def hadamard(self, form: EdgeForm, *, shift: float = 0.0) -> LogDet:
         """Sum of ln det of the diagonal blocks, an upper bound of `log_det` (Hadamard and Fischer)."""
         pattern = self._pattern(form.block_size)
@@ -133,13 +139,13 @@ class LogDetSolver:
         scale = np.sqrt(np.diagonal(blocks, axis1=1, axis2=2))
         scaled = blocks / (scale[:, :, None] * scale[:, None, :])
         log_dets = np.linalg.slogdet(scaled)[1] + 2 * np.log(scale).sum(axis=1)
+        if not np.isfinite(log_dets).all():  # a block is singular in double precision
+            return _UNKNOWN
         value = math.fsum(log_dets)
         ratio = pattern.magnitude(form).reshape(scale.shape) / scale**2
-        condition = (
-            np.linalg.norm(np.linalg.inv(scaled), axis=(1, 2)) * ratio.max(axis=1) if scale.shape[1] > 1 else ratio[:, 0]
-        )
+        condition = np.linalg.cond(scaled, "fro") * ratio.max(axis=1)
         error = UNIT_ROUNDOFF * float(_ASSEMBLY_OPERATIONS * form.block_size * condition.sum() + np.abs(log_dets).sum())
-        return form.multiplicity * LogDet(value, error)
+        return form.multiplicity * (LogDet(value, error) if math.isfinite(error) else _UNKNOWN)
 
     def _pattern(self, block_size: int) -> BlockPattern:
         if block_size not in self._patterns:
@@ -155,16 +161,16 @@ class LogDetSolver:
                 self._factors[pattern.block_size] = _QDLDL.Solver(upper, upper=True)
         except RuntimeError:  # a zero pivot
             self._factors.pop(pattern.block_size, None)
-            return LogDet(math.nan, math.inf)
+            return _UNKNOWN
         factor = self._factors[pattern.block_size]
         lower, pivots, order = _factor_parts(factor)
         if not (pivots > 0).all():
-            return LogDet(math.nan, math.inf)
+            return _UNKNOWN
         log_pivots = np.log(pivots)
         variances = _variances(factor, form, pattern, shift)
         error = _factor_error(upper, lower, order, pattern.magnitude(form), variances, form.block_size)
         error = UNIT_ROUNDOFF * (error + float(np.abs(log_pivots).sum())) + form.root_error
-        return LogDet(math.fsum(log_pivots), error if math.isfinite(error) else math.inf)
+        return LogDet(math.fsum(log_pivots), error) if math.isfinite(error) else _UNKNOWN
 
 
 def _factor_parts(factor: Any) -> tuple[sparse.csc_array, FloatArray, IntArray]:
@@ -218,17 +224,17 @@ def _by_qr(form: EdgeForm, pattern: BlockPattern, shift: float) -> LogDet:
     rows = pattern.dense_rows(form)
     if shift:
         rows = np.concatenate([rows, math.sqrt(shift) * np.eye(pattern.size)])
-    if len(rows) < pattern.size:
-        return LogDet(math.nan, math.inf)
+    if len(rows) < pattern.size or not np.isfinite(rows).all():
+        return _UNKNOWN
     norms = np.linalg.norm(rows, axis=0)
     if not (norms > 0).all():
-        return LogDet(math.nan, math.inf)
+        return _UNKNOWN
     scaled = rows / norms
     scaled = scaled[np.argsort(-np.abs(scaled).max(axis=1), kind="stable")]
     triangle, permutation = _pivoted_qr(scaled)
     diagonal = np.abs(np.diagonal(triangle))
     if diagonal.min() <= UNIT_ROUNDOFF:
-        return LogDet(math.nan, math.inf)
+        return _UNKNOWN
     inverse = linalg.solve_triangular(triangle, np.eye(pattern.size))
     standard_deviations = np.empty(pattern.size)
     standard_deviations[permutation] = np.linalg.norm(inverse, axis=1)

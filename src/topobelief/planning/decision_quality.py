@@ -115,4 +115,5 @@ def _correlations(a: FloatArray, b: FloatArray) -> tuple[float, float, float]:
     from scipy import stats  # heavy, and needed only when quality is asked for
 
     kendall = float(stats.kendalltau(a, b).statistic)
-    return rank_correlation(a, b), kendall, float(np.corrcoef(a, b)[0, 1])
+    scaled = [(values - values.mean()) / np.ptp(values) for values in (a, b)]  # whatever the unit, nothing overflows
+    return rank_correlation(a, b), kendall, float(np.corrcoef(*scaled)[0, 1])

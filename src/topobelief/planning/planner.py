@@ -93,12 +93,8 @@ class Planner:
         require_choice("determinant", determinant, get_args(Determinant))
         anchor = graph.num_poses - 1 if anchor is None else checked_anchor(graph.num_poses, anchor)
         graph.topology.require_connected(anchor=anchor, names=graph.ids)
-        if signature == "von_neumann" and graph.num_poses > DENSE_SPECTRUM_SIZE and not allow_dense_spectrum:
-            raise InvalidInputError(
-                f"the exact von Neumann entropy of {graph.num_poses} poses takes about "
-                f'{expected_spectrum_seconds(graph.num_poses):.0f} s an action; use "von_neumann_approx", '
-                "or pass allow_dense_spectrum=True"
-            )
+        self._largest_spectrum = DENSE_SPECTRUM_SIZE if signature == "von_neumann" and not allow_dense_spectrum else math.inf
+        self._refuse_dense_spectrum(graph.num_poses)
         self._graph = graph
         if bounds == "paper":
             require_equal_noise(fisher_rows(graph))
@@ -154,6 +150,7 @@ class Planner:
         """
         _check_limits(margin, proof, max_evaluations, deadline)
         check_actions(self._graph, actions)
+        self._refuse_dense_spectrum(self._graph.num_poses + max(action.num_new_poses for action in actions))
         if self._evaluation.family == "paper":
             self._require_equal_noise(actions)
         search = Search(self._evaluation, actions, Clock(deadline, on_progress))
@@ -192,6 +189,14 @@ class Planner:
                 values[index] = self._evaluation.of(action).entropy().value
             clock.report("evaluations", index + 1, len(actions))
         return values
+
+    def _refuse_dense_spectrum(self, num_poses: int) -> None:
+        if num_poses > self._largest_spectrum:
+            raise InvalidInputError(
+                f"the exact von Neumann entropy of {num_poses} poses takes about "
+                f'{expected_spectrum_seconds(num_poses):.0f} s an action; use "von_neumann_approx", '
+                "or pass allow_dense_spectrum=True"
+            )
 
     def _require_equal_noise(self, actions: Sequence[Action]) -> None:
         """Fail before the work, not in the middle of it, where the paper's family meets other noise."""

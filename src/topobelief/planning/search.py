@@ -134,7 +134,7 @@ class Search:
         elif unknown or math.isnan(self._upper[best]):
             error_bound = math.inf
         else:
-            error_bound = max(0.0, self._value(best) - float(np.min(self._lower[others])))
+            error_bound = max(0.0, float(self._upper[best] - np.min(self._lower[others])))
         open_actions = [index for index in survivors if index != best and math.isnan(self._entropies[index])]
         evaluated_best = not math.isnan(self._entropies[best])
         proven = not open_actions and (evaluated_best or survivors == [best])
@@ -151,11 +151,6 @@ class Search:
         """U^, or the least value once evaluated; the earlier in the ranking where values tie."""
         values = (self._entropies + self._costs)[self._ranking]
         return self._ranking[0 if np.isnan(values).all() else int(np.nanargmin(values))]
-
-    def _value(self, best: int) -> float:
-        """The best's exact value, or its upper bound."""
-        exact = self._entropies[best] + self._costs[best]
-        return float(self._upper[best] if math.isnan(exact) else exact)
 
     def _survivors(self) -> list[int]:
         """Actions that no bound rules out, in ranking order; U^ stays."""
