@@ -41,7 +41,12 @@ def main() -> None:
     row("import topobelief", [sys.executable, "-c", "import topobelief"], 0.3, repeat=7)
     with tempfile.TemporaryDirectory() as out:
         goal = ["--goal", "25", "-2.95", "--out", out]
-        row("topobelief plan, the office", plan(office / "office.g2o", "--map", str(office / "office.csv"), *goal), 4.0, repeat=5)
+        row(
+            "topobelief plan, the office",
+            plan(office / "office.g2o", "--map", str(office / "office.csv"), *goal),
+            4.0,
+            repeat=5,
+        )
         if not city.exists():
             print(f"city10000.g2o is not in {data}: its rows are left out")
             return

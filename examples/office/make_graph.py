@@ -16,7 +16,14 @@ import topobelief as tb
 
 HERE = Path(__file__).resolve().parent
 START = (20.0, 0.0)  # of the first planning session of Kitanov and Indelman, arXiv 1903.00927
-TOUR = [(13.5, -1.8), (13.5, 2.0), (22.0, 3.5), (21.0, -2.0), (13.5, 5.5), (26.0, 8.0)]  # ends where their second session starts
+TOUR = [
+    (13.5, -1.8),
+    (13.5, 2.0),
+    (22.0, 3.5),
+    (21.0, -2.0),
+    (13.5, 5.5),
+    (26.0, 8.0),
+]  # ends where their second session starts
 SIGMA_POSITION = 0.1  # m
 SIGMA_HEADING = 0.02  # rad
 SPACING = 1.0  # m
