@@ -24,7 +24,7 @@ from topobelief.errors import InvalidInputError, PlanningError
 from topobelief.world import shapes
 
 _BALLS_PER_PATH = 2  # how often each path of the queue is varied
-_ATTEMPTS_PER_PATH = 8  # balls of one radius tried, per path that is missing
+_ATTEMPTS_PER_PATH = 8  # balls of one radius tried, per path asked for
 _NUM_SAMPLES = 32  # places at which the Fréchet distance of two paths is taken
 _PIECES = 4  # of each leg of a path, between which corners are cut
 _LOOKAHEAD = 32  # pieces that a cut corner replaces at most
@@ -77,6 +77,8 @@ def diverse_paths(
         raise InvalidInputError(f"expected a detour limit of at least 1 times the shortest path, or None, got {max_detour}")
     if not 0 < ball_radius < 0.5:
         raise InvalidInputError(f"expected a ball radius between 0 and 0.5 of the shortest path, got {ball_radius}")
+    if max_rays < 0:
+        raise InvalidInputError(f"expected max_rays of at least 0, got {max_rays}")
     roadmap = roadmap.between(start, goal)
     shortest = roadmap.shortest_path()
     if shortest is None:
@@ -88,39 +90,54 @@ def diverse_paths(
     max_length = math.inf if max_detour is None else max_detour * length
     rays = Rays.of_obstacles(roadmap, min_size=radius, max_length=max_length, max_rays=max_rays)
     classes = shortest_paths_by_class(roadmap, rays, num_classes=num_paths, max_length=max_length)
-    paths = [_straightened(roadmap, rays, roadmap.vertices[path]) for path in classes]
-    paths = [_straightened(roadmap, rays, path, pieces=_PIECES) for path in paths]
+    paths = [
+        _straightened(roadmap, rays, _straightened(roadmap, rays, roadmap.vertices[path]), pieces=_PIECES) for path in classes
+    ]
+    paths = _within_limit(paths, max_detour)
     rng = np.random.default_rng(seed)
     while len(paths) < num_paths and radius >= roadmap.robot_radius:
-        _fill_up(paths, num_paths, roadmap, rays, classes, radius=radius, max_length=max_length, rng=rng)
+        further = _further_paths(roadmap, rays, classes, paths, num_paths, radius=radius, max_length=max_length, rng=rng)
+        paths = _within_limit(paths + further, max_detour)
         radius /= 2
-    paths.sort(key=path_length)
-    longest = math.inf if max_detour is None else max_detour * path_length(paths[0])
-    return [path for path in paths if path_length(path) <= longest]
+    return paths
 
 
-def _fill_up(
-    paths: list[FloatArray],
-    num_paths: int,
+def _within_limit(paths: list[FloatArray], max_detour: float | None) -> list[FloatArray]:
+    """The paths that are not longer than the limit times the shortest, by length."""
+    by_length = sorted(paths, key=path_length)
+    longest = math.inf if max_detour is None else max_detour * path_length(by_length[0])
+    return [path for path in by_length if path_length(path) <= longest]
+
+
+def _further_paths(
     roadmap: Roadmap,
     rays: Rays,
     classes: list[list[int]],
+    paths: list[FloatArray],
+    num_paths: int,
     *,
     radius: float,
     max_length: float,
     rng: np.random.Generator,
-) -> None:
-    """Append detours around balls of a radius that are further than it from all paths in the list."""
-    attempts = _ATTEMPTS_PER_PATH * (num_paths - len(paths))
+) -> list[FloatArray]:
+    """Detours around balls of a radius, further than it from all paths and from each other, to make `num_paths`."""
+    further: list[FloatArray] = []
     samples = [sampled(path, _NUM_SAMPLES) for path in paths]
-    for detour in _detours_around_balls(roadmap, classes, radius=radius, max_length=max_length, attempts=attempts, rng=rng):
-        path = _straightened(roadmap, rays, roadmap.vertices[detour.path], centres=detour.centres, radius=radius)
-        sample = sampled(path, _NUM_SAMPLES)
-        if all(shapes.frechet_distance(sample, other) > radius for other in samples):
-            paths.append(_straightened(roadmap, rays, path, pieces=_PIECES, centres=detour.centres, radius=radius))
+    for detour in _detours_around_balls(
+        roadmap, classes, radius=radius, max_length=max_length, attempts=_ATTEMPTS_PER_PATH * num_paths, rng=rng
+    ):
+        path, sample = roadmap.vertices[detour.path], np.zeros((0, 2))
+        for pieces in (1, _PIECES):  # the first is cheap and enough to see that most are nothing new
+            path = _straightened(roadmap, rays, path, pieces=pieces, centres=detour.centres, radius=radius)
+            sample = sampled(path, _NUM_SAMPLES)
+            if any(shapes.frechet_distance(sample, other) <= radius for other in samples):
+                break
+        else:
+            further.append(path)
             samples.append(sample)
-        if len(paths) == num_paths:
-            return
+        if len(samples) == num_paths:
+            break
+    return further
 
 
 @dataclass(frozen=True, eq=False)

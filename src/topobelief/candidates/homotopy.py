@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import heapq
 import math
+from collections import defaultdict
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -127,45 +127,88 @@ def shortest_paths_by_class(roadmap: Roadmap, rays: Rays, *, num_classes: int, m
     vertices: list[Point] = [(x, y) for x, y in roadmap.vertices.tolist()]
     to_goal: list[float] = roadmap.distances_to(1).tolist()
     neighbours = _neighbours(roadmap, rays)
-    words, word_ids = [Word()], {Word(): 0}
-    reached: list[dict[int, float]] = [{0: 0.0}]  # by word: the least length found to each vertex
+    words = _Words()
+    reached: defaultdict[int, dict[int, float]] = defaultdict(dict, {0: {0: 0.0}})  # by word: least length to a vertex
     expanded: list[set[int]] = [set() for _ in vertices]  # by vertex: words
-    trail = [_Step(0, -1)]
+    trail = _Trail([0], [-1])
     queue = [(to_goal[0], 0.0, 0, 0)]  # length by way of here, length so far, step of the trail, word
     found: list[list[int]] = []
     while queue and len(found) < num_classes:
         _, length, step, word = heapq.heappop(queue)
-        vertex = trail[step].vertex
+        vertex = trail.vertex[step]
         known = expanded[vertex]
-        if word in known or len(known) >= num_classes or (known and _crosses_itself(trail, step, vertices)):
+        if word in known or len(known) >= num_classes or (known and trail.crosses_itself(step, vertices)):
             continue
         known.add(word)
         if vertex == 1:
-            found.append(_walked_back(trail, step))
+            found.append(trail.path_to(step))
         for neighbour, edge_length, letters in neighbours[vertex]:
+            next_word = words.followed_by(word, letters) if letters else word
             total = length + edge_length
-            bound = total + to_goal[neighbour]
-            if bound > max_length:
+            if total >= reached[next_word].get(neighbour, math.inf):
                 continue
-            next_word = word
-            if letters:
-                spelled = joined(words[word], letters)
-                next_word = word_ids.setdefault(spelled, len(words))
-                if next_word == len(words):
-                    words.append(spelled)
-                    reached.append({})
-            if total < reached[next_word].get(neighbour, math.inf):
+            bound = total + to_goal[neighbour]
+            if bound <= max_length:
                 reached[next_word][neighbour] = total
-                heapq.heappush(queue, (bound, total, len(trail), next_word))
-                trail.append(_Step(neighbour, step))
+                heapq.heappush(queue, (bound, total, len(trail.vertex), next_word))
+                trail.vertex.append(neighbour)
+                trail.before.append(step)
     return found
 
 
-class _Step(NamedTuple):
-    """A step of a search."""
+class _Words:
+    """Reduced words by number; 0 is the empty one."""
 
-    vertex: int
-    before: int  # step, -1 for none
+    def __init__(self) -> None:
+        self._words = [Word()]
+        self._numbers = {Word(): 0}
+
+    def followed_by(self, number: int, letters: Word) -> int:
+        """The word that one followed by some letters reduces to."""
+        word = joined(self._words[number], letters)
+        result = self._numbers.setdefault(word, len(self._words))
+        if result == len(self._words):
+            self._words.append(word)
+        return result
+
+
+@dataclass(frozen=True, slots=True)
+class _Trail:
+    """Steps of a search: the vertex of each, and the step before it, -1 for none."""
+
+    vertex: list[int]
+    before: list[int]
+
+    def path_to(self, step: int) -> list[int]:
+        """Vertices from the first step to this one."""
+        path: list[int] = []
+        while step >= 0:
+            path.append(self.vertex[step])
+            step = self.before[step]
+        return path[::-1]
+
+    def crosses_itself(self, step: int, vertices: list[Point]) -> bool:
+        """Whether the last edge of the path to a step crosses an earlier one, or leads to a vertex that it has been to."""
+        last, joint_step = self.vertex[step], self.before[step]
+        if joint_step < 0:
+            return False
+        joint, step = self.vertex[joint_step], self.before[joint_step]
+        a, b = vertices[joint], vertices[last]
+        x_min, x_max, y_min, y_max = min(a[0], b[0]), max(a[0], b[0]), min(a[1], b[1]), max(a[1], b[1])
+        later, d = joint, a
+        while step >= 0:
+            vertex, step = self.vertex[step], self.before[step]
+            c = vertices[vertex]
+            apart = (
+                (c[0] < x_min and d[0] < x_min)
+                or (c[0] > x_max and d[0] > x_max)
+                or (c[1] < y_min and d[1] < y_min)
+                or (c[1] > y_max and d[1] > y_max)
+            )
+            if vertex == last or (not (apart or later == joint) and _cross(a, b, c, d)):
+                return True
+            later, d = vertex, c
+        return False
 
 
 def _neighbours(roadmap: Roadmap, rays: Rays) -> list[list[tuple[int, float, Word]]]:
@@ -178,34 +221,6 @@ def _neighbours(roadmap: Roadmap, rays: Rays) -> list[list[tuple[int, float, Wor
         result[i].append((j, length, word))
         result[j].append((i, length, inverse(word)))
     return result
-
-
-def _walked_back(trail: list[_Step], step: int) -> list[int]:
-    """Vertices from the first step to this one."""
-    path: list[int] = []
-    while step >= 0:
-        vertex, step = trail[step]
-        path.append(vertex)
-    return path[::-1]
-
-
-def _crosses_itself(trail: list[_Step], step: int, vertices: list[Point]) -> bool:
-    """Whether the last edge of a path crosses an earlier one, or leads to a vertex that it has been to."""
-    last, step = trail[step]
-    if step < 0:
-        return False
-    joint, step = trail[step]
-    a, b = vertices[joint], vertices[last]
-    x_min, x_max, y_min, y_max = min(a[0], b[0]), max(a[0], b[0]), min(a[1], b[1]), max(a[1], b[1])
-    later = joint
-    while step >= 0:
-        vertex, step = trail[step]
-        c, d = vertices[later], vertices[vertex]
-        apart = max(c[0], d[0]) < x_min or min(c[0], d[0]) > x_max or max(c[1], d[1]) < y_min or min(c[1], d[1]) > y_max
-        if vertex == last or (later != joint and not apart and _cross(a, b, c, d)):
-            return True
-        later = vertex
-    return False
 
 
 def _cross(a: Point, b: Point, c: Point, d: Point) -> bool:

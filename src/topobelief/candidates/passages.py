@@ -14,7 +14,7 @@ from scipy.spatial import Delaunay
 from topobelief.arrays import FloatArray
 from topobelief.world import World
 
-_WIDEST = 1.5  # robot diameters; what is wider, uniform sampling finds
+_WIDEST = 2.0  # robot diameters; what is wider, uniform sampling finds
 _OUTLINE_SPACING = 1.0  # robot radii between points of the outline
 
 
@@ -25,7 +25,7 @@ def narrow_passages(world: World, robot_radius: float) -> FloatArray:
     ----------
     world
     robot_radius
-        Metres. A passage is what is between 1 and 1.5 diameters wide.
+        Metres. A passage is what is between 1 and 2 diameters wide.
 
     Returns
     -------
@@ -34,7 +34,7 @@ def narrow_passages(world: World, robot_radius: float) -> FloatArray:
         in the same order, some of which may be in collision. Some passages may be out of reach.
     """
     outline = world.outline(spacing=_OUTLINE_SPACING * robot_radius)
-    triangles = Delaunay(outline).simplices
+    triangles = Delaunay(outline - outline.mean(axis=0)).simplices
     sides = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
     a, b = outline[np.unique(sides, axis=0)].transpose(1, 0, 2)
     width, middle = np.linalg.norm(b - a, axis=1), (a + b) / 2

@@ -1,10 +1,10 @@
 """Probabilistic roadmaps: random places where the robot fits, joined by straight ways that it can drive.
 
-PRM* (Karaman and Frazzoli, "Sampling-based algorithms for optimal motion planning", IJRR 2011): vertices uniform over
-what the robot can reach, each joined to its k = e (1 + 1/2) ln V nearest ones (d = 2), as far as the straight way
-between them is free. Whether start and goal connect at all is decided before any vertex is drawn, by eroding the
-world; the roadmap then grows until they connect in it too, and with them nearly all that is in reach. Narrow passages
-get vertices of their own.
+PRM* (Karaman and Frazzoli, "Sampling-based algorithms for optimal motion planning", IJRR 2011): vertices at random over
+what the robot can reach (denser around start and goal where the world is much larger than their distance), each joined
+to its k = e (1 + 1/2) ln V nearest ones (d = 2), as far as the straight way between them is free. Whether start and goal
+connect at all is decided before any vertex is drawn, by eroding the world; the roadmap then grows until they connect in
+it too, and with them nearly all that is in reach. Narrow passages get vertices of their own.
 """
 
 from __future__ import annotations
@@ -31,6 +31,8 @@ _dijkstra = cast("Any", dijkstra)  # whose stub refuses one index
 _CONNECTED_SHARE = 0.9  # of the vertices, all of them within reach, that hang together on a roadmap that is dense enough
 _MAX_GROWTH = 16  # times the vertices asked for, after which a passage counts as too narrow for chance to find
 _MAX_GROWTH_CONNECTED = 4  # the same, where start and goal connect already
+_MAX_DRAWS = 100_000  # random places at a time
+_MAX_DRAWS_PER_PLACE = 10_000  # in which the robot fits; where it takes more, it fits hardly anywhere
 _SAME_PLACE = 1e-9  # metres
 
 
@@ -152,7 +154,8 @@ def build_roadmap(
     Returns
     -------
     Roadmap
-        Every edge keeps the robot's centre more than its radius from all obstacles and from the bounds.
+        Every edge keeps the robot's centre more than its radius from all obstacles and from the bounds. Where the robot
+        hardly fits at all, the vertices may be fewer.
 
     Raises
     ------
@@ -172,7 +175,7 @@ def build_roadmap(
     size = num_vertices
     while True:
         draws = max(size - len(vertices), size // 2)
-        vertices = np.concatenate([vertices, _random_places(world, region, draws, robot_radius, rng=rng)])
+        vertices = np.concatenate([vertices, _random_places(world, region, ends, draws, robot_radius, rng=rng)])
         edges = _free_edges(world, vertices, robot_radius)
         roadmap = Roadmap(world, float(robot_radius), region, vertices, edges)
         reached = np.isfinite(roadmap.distances_to(0))
@@ -207,7 +210,7 @@ def checked_ends(world: World, start: ArrayLike, goal: ArrayLike, robot_radius: 
                 "choose a place on the map"
             )
         if clearance <= robot_radius:
-            where = "in an obstacle" if clearance <= 0 else f"{clearance:.2f} m from the nearest obstacle"
+            where = "in an obstacle or unknown space" if clearance <= 0 else f"{clearance:.2f} m from the nearest obstacle"
             raise PlanningError(
                 f"expected a {name} with more clearance than the robot's radius of {robot_radius:g} m, "
                 f"got {_place(place)}, {where}; choose a place in the open or a smaller radius"
@@ -224,16 +227,25 @@ def _checked_place(place: ArrayLike, name: str) -> FloatArray:
     return array[:2]
 
 
-def _random_places(world: World, region: Polygon, count: int, robot_radius: float, *, rng: np.random.Generator) -> FloatArray:
-    """Random places, uniform over what the robot's centre can reach; shape (count, 2)."""
-    x_min, y_min, x_max, y_max = region.bounds
-    share = region.area / ((x_max - x_min) * (y_max - y_min))
-    found = np.zeros((0, 2))
-    while len(found) < count:
-        draws = math.ceil(1.2 * (count - len(found)) / share) + 16
-        places = rng.uniform((x_min, y_min), (x_max, y_max), size=(draws, 2))
-        found = np.concatenate([found, _reachable(world, region, places, robot_radius)])
-    return found[:count]
+def _random_places(
+    world: World, region: Polygon, ends: FloatArray, count: int, robot_radius: float, *, rng: np.random.Generator
+) -> FloatArray:
+    """Random places that the robot's centre can reach; shape (count, 2), or less where it hardly fits.
+
+    Half of them are uniform over the region, half over what lies around start and goal, up to their distance away.
+    """
+    corners = np.array(region.bounds).reshape(2, 2)
+    margin = np.linalg.norm(ends[1] - ends[0])
+    around = np.clip([ends.min(axis=0) - margin, ends.max(axis=0) + margin], *corners)
+    shares: list[FloatArray] = []
+    for size, (low, high) in ((count // 2, corners), (count - count // 2, around)):
+        found, drawn = np.zeros((0, 2)), 0
+        while len(found) < size and drawn <= _MAX_DRAWS_PER_PLACE * (len(found) + 1):
+            places = rng.uniform(low, high, size=(min(2 * size + drawn, _MAX_DRAWS), 2))
+            drawn += len(places)
+            found = np.concatenate([found, _reachable(world, region, places, robot_radius)])
+        shares.append(found[:size])
+    return np.concatenate(shares)
 
 
 def _reachable(world: World, region: Polygon, places: FloatArray, robot_radius: float) -> FloatArray:

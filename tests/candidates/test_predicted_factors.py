@@ -1,0 +1,201 @@
+"""Predicted factors: where the new poses stand, which closures they make, and with what noise."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from topobelief import Action, PoseGraph, posterior
+from topobelief.candidates.polyline import path_length
+from topobelief.candidates.predicted_factors import default_information, predict_actions
+from topobelief.errors import InvalidInputError
+from topobelief.world import World
+
+OMEGA = np.diag([100.0, 100.0, 800.0])
+
+
+def drive(positions: list[tuple[float, float]], theta: float = 0.0) -> PoseGraph:
+    poses = np.column_stack([np.array(positions, dtype=float), np.full(len(positions), theta)])
+    chain = np.array([(i, i + 1) for i in range(len(poses) - 1)]).reshape(-1, 2)
+    return PoseGraph(poses, chain, None, OMEGA)
+
+
+def closures(action: Action) -> set[tuple[int, int]]:
+    return {(int(a), int(b)) for a, b in action.edges[action.num_new_poses :]}
+
+
+def predict(graph: PoseGraph, path: list[tuple[float, float]] | np.ndarray, **rules: object) -> Action:
+    return predict_actions(graph, [path], **rules)[0]
+
+
+ORIGIN = drive([(0, 0)])
+coordinates = st.integers(-20, 20).map(lambda value: value / 4)
+
+
+class TestPoses:
+    def test_stand_a_metre_apart_head_along_the_path_and_end_at_its_end(self) -> None:
+        poses = predict(ORIGIN, [(0, 0), (2.5, 0), (2.5, 2)], information=OMEGA).poses
+        expected = [(1, 0, 0), (2, 0, 0), (2.5, 0.5, np.pi / 2), (2.5, 1.5, np.pi / 2), (2.5, 2, np.pi / 2)]
+        np.testing.assert_allclose(poses, expected, atol=1e-12)
+
+    def test_at_a_corner_head_as_they_came(self) -> None:
+        assert predict(ORIGIN, [(0, 0), (2, 0), (2, 1)], information=OMEGA).poses[1].tolist() == [2, 0, 0]
+
+    @given(
+        st.lists(st.tuples(coordinates, coordinates), min_size=1, max_size=6),
+        st.sampled_from([0.25, 0.3, 1.0, 2.5]),
+    )
+    def test_are_a_spacing_apart_along_the_path_but_for_the_last(self, points: list, spacing: float) -> None:
+        path = np.array([(0.0, 0.0), *points])
+        poses = predict(ORIGIN, path, information=OMEGA, spacing=spacing).poses
+        length = path_length(path)
+        assert len(poses) == math.ceil(length / spacing - 1e-9)
+        if len(poses):
+            assert poses[-1, :2].tolist() == path[-1].tolist()
+        dense = np.linspace(0, 1, 2001)[:, None, None]
+        on_path = ((1 - dense) * path[:-1] + dense * path[1:]).reshape(-1, 2)
+        for pose in poses:
+            assert np.linalg.norm(on_path - pose[:2], axis=1).min() < 0.01
+        steps = np.linalg.norm(np.diff(np.vstack([[(0, 0)], poses[:, :2]]), axis=0), axis=1)
+        assert (steps <= spacing + 1e-9).all()
+
+    @given(st.integers(1, 60), st.sampled_from([0.1, 0.3, 1.0, 0.7]), st.floats(0, 6.28))
+    def test_a_path_of_whole_steps_ends_without_a_tiny_one(self, count: int, spacing: float, angle: float) -> None:
+        end = count * spacing * np.array([np.cos(angle), np.sin(angle)])
+        poses = predict(ORIGIN, np.array([(0, 0), end]), information=OMEGA, spacing=spacing).poses
+        assert len(poses) == count
+        np.testing.assert_allclose(poses[-1, :2], end, atol=1e-12)
+
+    def test_a_path_that_begins_elsewhere_is_led_there_straight(self) -> None:
+        poses = predict(drive([(5, 0), (0, 0)]), [(0, 2), (2, 2)], information=OMEGA).poses
+        np.testing.assert_allclose(poses[:, :2], [(0, 1), (0, 2), (1, 2), (2, 2)], atol=1e-12)
+
+    def test_a_path_that_goes_nowhere_adds_nothing(self) -> None:
+        for path in ([(0, 0)], [(0, 0), (0, 0)]):
+            action = predict(ORIGIN, path, information=OMEGA)
+            assert action.num_new_poses == len(action.edges) == 0
+            assert posterior(ORIGIN, action).num_poses == 1
+
+    def test_in_space_are_upright_at_the_height_of_the_last_pose(self) -> None:
+        """The first odometry factor turns the robot upright; with a closure it measures what the poses predict."""
+        tilt = [0, 0, 0, 0, 0, np.sin(0.1), np.cos(0.1)]
+        poses = np.array([[x, 0, 3, 0, 0, 0, 1] for x in range(6)], dtype=float)
+        poses[-1, 3:] = tilt[3:]
+        graph = PoseGraph(poses, [(i, i + 1) for i in range(5)], None, np.eye(6))
+        action = predict(graph, [(5, 0), (5, 1), (0, 1)])
+        np.testing.assert_allclose(action.poses[:, 2], 3)
+        np.testing.assert_allclose(action.poses[0, 3:], [0, 0, np.sin(np.pi / 4), np.cos(np.pi / 4)], atol=1e-12)
+        assert (11, 0) in closures(action)
+        assert posterior(graph, action).chi2 == pytest.approx(0, abs=1e-18)
+
+
+class TestEdges:
+    def test_odometry_leads_from_the_last_pose_from_new_to_new(self) -> None:
+        action = predict(drive([(-1, 0), (0, 0)]), [(0, 0), (3, 0)])
+        assert action.edges.tolist() == [[1, 2], [2, 3], [3, 4]]
+
+    def test_a_way_back_closes_loops_new_to_old(self) -> None:
+        """Out along y = 0 to x = 6, back along y = 1: closures where the gap allows, nearer than 2 m."""
+        graph = drive([(x, 0) for x in range(7)])
+        action = predict(graph, [(6, 0), (6, 1), (3, 1)])  # new poses 7 to 10 at x = 6, 5, 4, 3
+        assert closures(action) == {(9, 4), (9, 3), (10, 3), (10, 2), (10, 4)}
+
+    @given(st.integers(0, 50), st.sampled_from([0.5, 1.0, 3.1416]), st.integers(2, 8), st.floats(0.5, 3.0))
+    def test_closures_are_those_of_the_rule_taken_literally(self, seed: int, angle: float, gap: int, radius: float) -> None:
+        rng = np.random.default_rng(seed)
+        poses = np.column_stack([np.cumsum(rng.normal(size=(30, 2)), axis=0), rng.uniform(-3, 3, 30)])
+        graph = PoseGraph(poses, [(i, i + 1) for i in range(29)], None, OMEGA)
+        world = World.from_boxes([(-1, -1, 0.5, 0.5)], (-50, -50, 50, 50))
+        path = poses[-1, :2] + np.cumsum(np.vstack([[(0, 0)], rng.normal(size=(5, 2))]), axis=0)
+        angle = min(angle, math.pi)
+        action = predict(graph, path, closure_radius=radius, closure_angle=angle, min_index_gap=gap, world=world)
+        every = np.vstack([poses, action.poses])
+        expected = set()
+        for i in range(30, len(every)):
+            for j in range(i - gap + 1):
+                turn = abs((every[i, 2] - every[j, 2] + np.pi) % (2 * np.pi) - np.pi)
+                near = np.linalg.norm(every[i, :2] - every[j, :2]) < radius
+                if near and turn <= angle and world.visible(every[i : i + 1, :2], every[j : j + 1, :2])[0]:
+                    expected.add((i, j))
+        assert closures(action) == expected
+        assert action.num_closures == len(expected)
+
+    @given(st.floats(0, 6.28), st.floats(-1e3, 1e3), st.floats(-1e3, 1e3))
+    def test_two_poses_back_on_a_straight_path_are_never_a_closure_by_rounding(self, angle: float, x: float, y: float) -> None:
+        """The paper's rule, gap 2 and below 2 m, at exactly 2 m."""
+        way = 20 * np.array([(0, 0), (np.cos(angle), np.sin(angle))])
+        action = predict(drive([(x, y)], theta=angle), way + np.array([x, y]), information=OMEGA, min_index_gap=2)
+        assert closures(action) == set()
+
+    def test_walls_hide_what_lies_behind_them(self) -> None:
+        graph = drive([(x, 0) for x in range(7)])
+        path = [(6, 0), (6, 1), (3, 1)]
+        world = World.from_boxes([(-1, 0.4, 5.5, 0.6)], (-1, -1, 8, 2))
+        assert closures(predict(graph, path)) != set()
+        assert closures(predict(graph, path, world=world)) == set()
+
+    def test_each_path_makes_an_action_of_its_own(self) -> None:
+        graph = drive([(0, 0), (1, 0)])
+        actions = predict_actions(graph, [[(1, 0), (4, 0)], np.array([(1.0, 0.0), (1.0, 2.0)])])
+        assert [action.label for action in actions] == ["path 0", "path 1"]
+        assert [action.num_new_poses for action in actions] == [3, 2]
+        assert predict_actions(graph, []) == []
+
+
+class TestInformation:
+    def test_is_the_one_that_all_edges_share(self) -> None:
+        assert (default_information(drive([(0, 0), (1, 0), (2, 0)])) == OMEGA).all()
+
+    def test_is_else_the_median_over_the_odometry_chain(self) -> None:
+        """Closures and one edge of absurd certainty change nothing."""
+        scales = [1.0, 2.0, 3.0, 4.0, 1e12]
+        edges = [(i, i + 1) for i in range(5)] + [(5, 0), (4, 0), (3, 0)]
+        information = np.array([scale * OMEGA for scale in (*scales, 0.1, 0.1, 0.1)])
+        graph = PoseGraph(np.eye(6, 3), edges, None, information)
+        assert (default_information(graph) == 3 * OMEGA).all()
+        assert (predict(graph, [(0, 0), (3, 0)]).information == 3 * OMEGA).all()
+
+    def test_is_of_all_edges_where_none_is_consecutive(self) -> None:
+        graph = PoseGraph(np.eye(3), [(0, 2)], None, OMEGA)
+        assert (default_information(graph) == OMEGA).all()
+
+    def test_is_a_matrix_of_the_chain_where_the_median_is_not_positive_definite(self) -> None:
+        """Three correlation matrices whose entries have the medians 0.9, 0.9 and -0.9, which no noise can have."""
+        correlations = [(0.9, 0.9, 0.7), (0.9, -0.7, -0.9), (-0.7, 0.9, -0.9)]
+        chain = np.array([[(1, a, b), (a, 1, c), (b, c, 1)] for a, b, c in correlations]) * [[[1]], [[2]], [[3]]]
+        median = np.median(chain, axis=0)
+        assert np.linalg.eigvalsh(median)[0] < 0
+        graph = PoseGraph(np.eye(4, 3), [(0, 1), (1, 2), (2, 3)], None, chain)
+        assert (default_information(graph) == chain[1]).all()
+
+    def test_given_is_taken(self) -> None:
+        assert (predict(drive([(0, 0), (1, 0)]), [(1, 0), (3, 0)], information=2 * OMEGA).information == 2 * OMEGA).all()
+
+    def test_of_a_graph_without_edges_must_be_given(self) -> None:
+        with pytest.raises(InvalidInputError, match="give `information`"):
+            predict_actions(ORIGIN, [[(0, 0), (1, 0)]])
+
+
+@pytest.mark.parametrize(
+    ("rules", "message"),
+    [
+        ({"spacing": 0}, "spacing above 0, got 0"),
+        ({"spacing": math.inf}, "spacing above 0, got inf"),
+        ({"closure_radius": -1}, "closure_radius above 0, got -1"),
+        ({"closure_angle": 4}, "closure_angle above 0 and at most 3.14159, got 4"),
+        ({"closure_angle": math.nan}, "closure_angle .* got nan"),
+        ({"min_index_gap": 1}, "min_index_gap of at least 2"),
+    ],
+)
+def test_rules_out_of_range_are_refused(rules: dict, message: str) -> None:
+    with pytest.raises(InvalidInputError, match=message):
+        predict_actions(drive([(0, 0), (1, 0)]), [[(1, 0), (2, 0)]], **rules)
+
+
+def test_a_path_that_is_none_is_named() -> None:
+    with pytest.raises(InvalidInputError, match="expected path 1 as finite waypoints"):
+        predict_actions(drive([(0, 0), (1, 0)]), [[(1, 0), (2, 0)], [(1, 0), (math.nan, 0)]])
