@@ -141,7 +141,7 @@ class TestEdges:
     def test_each_path_makes_an_action_of_its_own(self) -> None:
         graph = drive([(0, 0), (1, 0)])
         actions = predict_actions(graph, [[(1, 0), (4, 0)], np.array([(1.0, 0.0), (1.0, 2.0)])])
-        assert [action.label for action in actions] == ["path 0", "path 1"]
+        assert [action.label for action in actions] == ["path 1", "path 2"]
         assert [action.num_new_poses for action in actions] == [3, 2]
         assert predict_actions(graph, []) == []
 

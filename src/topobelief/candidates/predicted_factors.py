@@ -62,7 +62,7 @@ def predict_actions(
     Returns
     -------
     list of Action
-        In the order of the paths and labelled by it, "path 0" on. Poses head along the path, at a corner as they came.
+        In the order of the paths and labelled from "path 1" on (labels are for people; indices count from 0). Poses head along the path, at a corner as they came.
         First the odometry, old -> new, then the closures, new -> old, sorted. A path that ends where it begins at
         once adds nothing.
 
@@ -91,7 +91,7 @@ def predict_actions(
             graph, poses, tree, radius=closure_radius, angle=closure_angle, min_index_gap=min_index_gap, world=world
         )
         edges = np.concatenate([np.stack([new - 1, new], axis=1), closures])
-        actions.append(Action(poses, edges, omega, label=f"path {index}"))
+        actions.append(Action(poses, edges, omega, label=f"path {index + 1}"))
     return actions
 
 
