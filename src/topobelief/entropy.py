@@ -58,7 +58,7 @@ def joint_entropy(graph: PoseGraph, *, anchor: int = 0) -> float:
     >>> from topobelief.graph.pose_graph import PoseGraph
     >>> chain = PoseGraph([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [(0, 1), (1, 2)], None, np.diag([100, 100, 400]))
     >>> round(joint_entropy(chain), 6)  # a tree: 3 ln(2 pi e) - ln|Omega|
-    -6.688072
+    -6.688174
     """
     return joint_entropy_estimate(graph, anchor=anchor).value
 

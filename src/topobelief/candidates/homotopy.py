@@ -106,9 +106,10 @@ def inverse(word: Word) -> Word:
 def shortest_paths_by_class(roadmap: Roadmap, rays: Rays, *, num_classes: int, max_length: float = math.inf) -> list[list[int]]:
     """The shortest path from start to goal in each homotopy class, shortest first.
 
-    A* over (vertex, reduced word), with the distance to the goal as heuristic. Paths that cross themselves are dropped
-    on the way: they wind around an obstacle. At most `num_classes` words are expanded at a vertex, for these, followed
-    by the vertex's shortest way on, are as many classes already, none longer than what a further word would lead to.
+    A* over (vertex, reduced word), with the distance to the goal as heuristic. Paths that cross themselves, as nearly all
+    do that wind around an obstacle, are dropped on the way. At most `num_classes` words are expanded at a vertex, for
+    these, followed by the vertex's shortest way on, are as many classes already, none longer than what a further word
+    would lead to.
 
     Parameters
     ----------

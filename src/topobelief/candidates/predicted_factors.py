@@ -62,9 +62,9 @@ def predict_actions(
     Returns
     -------
     list of Action
-        In the order of the paths and labelled from "path 1" on (labels are for people; indices count from 0). Poses head along the path, at a corner as they came.
-        First the odometry, old -> new, then the closures, new -> old, sorted. A path that ends where it begins at
-        once adds nothing.
+        In the order of the paths and labelled from "path 1" on (labels are for people; indices count from 0). Poses
+        head along the path, at a corner as they came. First the odometry, old -> new, then the closures, new -> old,
+        sorted. A path that ends where it begins at once adds nothing.
 
     Raises
     ------

@@ -24,7 +24,6 @@ from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg.edge_form import EdgeForm, laplacian_form
 from topobelief.linalg.log_det import UNIT_ROUNDOFF
 
-
 _may_overflow = np.errstate(over="ignore", invalid="ignore")  # log-determinants of what is not finite are refused
 
 

@@ -136,9 +136,7 @@ def checked_anchor(num_nodes: int, anchor: int) -> int:
         Where there is no such node.
     """
     if not -num_nodes <= anchor < num_nodes:
-        raise InvalidGraphError(
-            f"expected an anchor from 0 to {num_nodes - 1}, got {anchor}"
-        )
+        raise InvalidGraphError(f"expected an anchor from 0 to {num_nodes - 1}, got {anchor}")
     return int(anchor) % num_nodes
 
 
