@@ -30,7 +30,7 @@ from topobelief.report.tables import candidate_table
 from topobelief.world import World
 from topobelief.world.trajectory import default_width
 
-EXACT_SECONDS = 3.0
+EXACT_SECONDS = 5.0
 """How long exact values that the decision did not need may take, for the picture of the bounds."""
 
 _LENGTH_BIAS = 0.9  # rank correlation with the number of poses above which the ranking mostly counts them
