@@ -10,7 +10,7 @@ from typing import get_args
 
 import pytest
 
-from topobelief.bounds.entropy_bounds import Determinant, Family
+from topobelief.bounds.entropy_bounds import Determinant
 from topobelief.cli import app, main, plan, plan_stages
 from topobelief.io import ros_map
 from topobelief.planning import evaluation, objectives, planner
@@ -56,7 +56,7 @@ def test_the_entry_point_exits_with_the_code(capsys):
     [
         (plan.Objective, objectives.ObjectiveName),
         (plan.Signature, evaluation.SignatureName),
-        (plan.Family, Family),
+        (plan.Family, planner.BoundsName),
         (plan.Determinant, Determinant),
         (plan.Proof, planner.Proof),
         (plan.Unknown, ros_map.Unknown),

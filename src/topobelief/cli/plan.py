@@ -11,7 +11,7 @@ import typer
 # The planner's own choices, repeated so that help need not load it; a test holds them together.
 Objective = Literal["joint", "map", "per_pose"]
 Signature = Literal["spanning_trees", "von_neumann", "von_neumann_approx"]
-Family = Literal["paper", "fischer"]
+Family = Literal["paper", "fischer", "anchored"]
 Determinant = Literal["cholesky", "hadamard"]
 Proof = Literal["none", "bounded", "optimal"]
 Unknown = Literal["occupied", "free"]
@@ -150,7 +150,10 @@ def plan(
     ] = "joint",
     signature: Annotated[Signature, typer.Option(help="What ranks the paths.", rich_help_panel=_DECISION)] = "spanning_trees",
     bounds: Annotated[
-        Family, typer.Option(help="Family of bounds; the paper's needs equal noise.", rich_help_panel=_DECISION)
+        Family,
+        typer.Option(
+            help="Family of bounds; the paper's needs equal noise, the anchored one numba.", rich_help_panel=_DECISION
+        ),
     ] = "fischer",
     determinant: Annotated[
         Determinant, typer.Option(help="In the lower bound: exact, or by its diagonal.", rich_help_panel=_DECISION)

@@ -6,12 +6,14 @@ prior's whitened rows, is computed once.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
+from typing import ClassVar, Literal, Protocol
 
 import numpy as np
 
+from topobelief.arrays import FloatArray
 from topobelief.bounds import log_det_bounds
 from topobelief.graph.action import Action, posterior
 from topobelief.graph.fisher import FisherRows, fisher_rows
@@ -95,7 +97,36 @@ class PosteriorEvaluation:
         return objective_value(objective, solver.log_det(form), self.size(objective))
 
 
-@dataclass(frozen=True)
+class Evaluation(Protocol):
+    """Quantities of actions on one prior, however they are computed; parameters as for `topobelief.Planner`."""
+
+    batch_size: ClassVar[int]
+    """Actions that are best asked for together."""
+
+    @property
+    def graph(self) -> PoseGraph: ...
+    @property
+    def objective(self) -> ObjectiveName: ...
+    @property
+    def signature(self) -> SignatureName: ...
+    @property
+    def family(self) -> str: ...
+    @property
+    def determinant(self) -> str: ...
+    def signatures(self, actions: Sequence[Action]) -> tuple[FloatArray, FloatArray]:
+        """Raw signatures, the larger, the better, and their rounding errors; each of shape (K,)."""
+        ...
+
+    def bounds(self, actions: Sequence[Action]) -> tuple[FloatArray, FloatArray]:
+        """LB and UB of the objective, cost excluded, widened by their rounding errors; each of shape (K,)."""
+        ...
+
+    def entropies(self, actions: Sequence[Action]) -> tuple[FloatArray, FloatArray]:
+        """The exact objective, cost excluded, and its rounding error; each of shape (K,)."""
+        ...
+
+
+@dataclass
 class ScratchEvaluation:
     """Quantities of any action on one prior, from scratch.
 
@@ -114,6 +145,9 @@ class ScratchEvaluation:
     family: str
     determinant: str
     anchor: int
+    _kept: tuple[Action, ActionEvaluation] | None = field(default=None, init=False, repr=False)
+
+    batch_size: ClassVar[int] = 1
 
     @cached_property
     def _prior_rows(self) -> FisherRows:
@@ -122,6 +156,24 @@ class ScratchEvaluation:
     def of(self, action: Action) -> ActionEvaluation:
         """The quantities of one action, computed when asked for."""
         return ActionEvaluation(self, PosteriorEvaluation(self.graph, self._prior_rows, action, self.anchor))
+
+    def signatures(self, actions: Sequence[Action]) -> tuple[FloatArray, FloatArray]:
+        """Raw signatures, the larger, the better, and their rounding errors; each of shape (K,)."""
+        return _columns(_pair(self._latest(action).signature()) for action in actions)
+
+    def bounds(self, actions: Sequence[Action]) -> tuple[FloatArray, FloatArray]:
+        """LB and UB of the objective, cost excluded, widened by their rounding errors; each of shape (K,)."""
+        return _columns(self._latest(action).bounds() for action in actions)
+
+    def entropies(self, actions: Sequence[Action]) -> tuple[FloatArray, FloatArray]:
+        """The exact objective, cost excluded, and its rounding error; each of shape (K,)."""
+        return _columns(_pair(self._latest(action).entropy()) for action in actions)
+
+    def _latest(self, action: Action) -> ActionEvaluation:
+        """The quantities of an action; those of the last one asked for are kept, so that a signature and bounds share them."""
+        if self._kept is None or self._kept[0] is not action:
+            self._kept = (action, self.of(action))
+        return self._kept[1]
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,3 +202,12 @@ class ActionEvaluation:
 def _rounded(value: float, num_terms: int) -> LogDet:
     """A sum of `num_terms` terms of one sign, with its rounding error."""
     return LogDet(value, UNIT_ROUNDOFF * num_terms * max(1.0, abs(value)))
+
+
+def _pair(quantity: LogDet) -> tuple[float, float]:
+    return quantity.value, quantity.error
+
+
+def _columns(pairs: Iterable[tuple[float, float]]) -> tuple[FloatArray, FloatArray]:
+    first, second = np.array(list(pairs), dtype=np.float64).reshape(-1, 2).T
+    return first, second

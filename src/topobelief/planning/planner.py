@@ -13,12 +13,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cached_property
+from importlib.util import find_spec
 from typing import Literal, get_args
 
 import numpy as np
 
 from topobelief.arrays import FloatArray
-from topobelief.bounds.entropy_bounds import Determinant, Family
+from topobelief.bounds.entropy_bounds import Determinant
 from topobelief.bounds.paper import require_equal_noise
 from topobelief.errors import InvalidActionError, InvalidGraphError, InvalidInputError, require_choice
 from topobelief.graph.action import Action, check_actions, posterior
@@ -27,11 +29,14 @@ from topobelief.graph.information import SAME_NOISE, shared_information
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.graph.topology import checked_anchor
 from topobelief.planning.decision import Decision
-from topobelief.planning.evaluation import ScratchEvaluation, SignatureName
+from topobelief.planning.evaluation import Evaluation, ScratchEvaluation, SignatureName
 from topobelief.planning.objectives import ObjectiveName
-from topobelief.planning.search import Clock, Progress, Search, naming_action
+from topobelief.planning.search import Clock, Progress, Search, named_quantity
 from topobelief.signatures.von_neumann import DENSE_SPECTRUM_SIZE, expected_spectrum_seconds
 
+_INCREMENTAL_WORK = 1_000_000  # actions times edges of the prior from which increments pay
+
+BoundsName = Literal["paper", "fischer", "anchored"]
 Proof = Literal["none", "bounded", "optimal"]
 
 
@@ -48,7 +53,8 @@ class Planner:
     signature
         What ranks the actions: "spanning_trees", "von_neumann" (dense spectrum) or "von_neumann_approx" (degrees).
     bounds
-        Family of bounds: "fischer" (any noise) or "paper" (one block-isotropic Omega).
+        Family of bounds: "fischer" (any noise), "paper" (one block-isotropic Omega) or "anchored" (any noise: exact prior,
+        bounded increment; far tighter, and about as dear as exact values; needs the extra `fast`).
     determinant
         "cholesky" or "hadamard" (looser, cheaper), in the lower bound of J.
     anchor
@@ -81,7 +87,7 @@ class Planner:
         *,
         objective: ObjectiveName = "joint",
         signature: SignatureName = "spanning_trees",
-        bounds: Family = "fischer",
+        bounds: BoundsName = "fischer",
         determinant: Determinant = "cholesky",
         anchor: int | None = None,
         normalized: bool = False,
@@ -89,16 +95,21 @@ class Planner:
     ) -> None:
         require_choice("objective", objective, get_args(ObjectiveName))
         require_choice("signature", signature, get_args(SignatureName))
-        require_choice("bounds", bounds, get_args(Family))
+        require_choice("bounds", bounds, get_args(BoundsName))
         require_choice("determinant", determinant, get_args(Determinant))
         anchor = graph.num_poses - 1 if anchor is None else checked_anchor(graph.num_poses, anchor)
         graph.topology.require_connected(anchor=anchor, names=graph.ids)
         self._largest_spectrum = DENSE_SPECTRUM_SIZE if signature == "von_neumann" and not allow_dense_spectrum else math.inf
         self._refuse_dense_spectrum(graph.num_poses)
         self._graph = graph
+        if bounds == "anchored" and not _has_kernels():
+            raise InvalidInputError(
+                "bounds=\"anchored\" expects numba to be installed, got none; run pip install 'topobelief[fast]'"
+            )
         if bounds == "paper":
             require_equal_noise(fisher_rows(graph))
-        self._evaluation = ScratchEvaluation(graph, objective, signature, normalized, bounds, determinant, anchor)
+        self._bounds = bounds
+        self._choices = (graph, objective, signature, normalized, bounds, determinant, anchor)
 
     @property
     def graph(self) -> PoseGraph:
@@ -151,9 +162,9 @@ class Planner:
         _check_limits(margin, proof, max_evaluations, deadline)
         check_actions(self._graph, actions)
         self._refuse_dense_spectrum(self._graph.num_poses + max(action.num_new_poses for action in actions))
-        if self._evaluation.family == "paper":
+        if self._bounds == "paper":
             self._require_equal_noise(actions)
-        search = Search(self._evaluation, actions, Clock(deadline, on_progress))
+        search = Search(self._evaluation_of(len(actions)), actions, Clock(deadline, on_progress))
         together = margin is None and proof != "none" and deadline is None
         search.rank(bounds_too=together)
         if margin is not None:
@@ -182,13 +193,30 @@ class Planner:
             Where double precision cannot give an entropy.
         """
         check_actions(self._graph, actions)
-        clock = Clock(None, on_progress)
+        clock, evaluation = Clock(None, on_progress), self._evaluation_of(len(actions))
         values = np.empty(len(actions))
-        for index, action in enumerate(actions):
-            with naming_action(index, action):
-                values[index] = self._evaluation.of(action).entropy().value
-            clock.report("evaluations", index + 1, len(actions))
+        for start in range(0, len(actions), evaluation.batch_size):
+            batch = list(range(start, min(start + evaluation.batch_size, len(actions))))
+            values[batch], _ = named_quantity(evaluation.entropies, actions, batch)
+            clock.report("evaluations", batch[-1] + 1, len(actions))
         return values
+
+    def _evaluation_of(self, num_actions: int) -> Evaluation:
+        """From scratch, or by increments where that is worth the compiled kernels' time to load."""
+        worthwhile = num_actions * self._graph.num_edges >= _INCREMENTAL_WORK and _has_kernels()
+        if worthwhile or self._bounds == "anchored":
+            return self._incremental
+        return self._scratch
+
+    @cached_property
+    def _scratch(self) -> Evaluation:
+        return ScratchEvaluation(*self._choices)
+
+    @cached_property
+    def _incremental(self) -> Evaluation:
+        from topobelief.planning.incremental import IncrementalEvaluation  # loads numba
+
+        return IncrementalEvaluation(*self._choices)
 
     def _refuse_dense_spectrum(self, num_poses: int) -> None:
         if num_poses > self._largest_spectrum:
@@ -217,6 +245,11 @@ class Planner:
                     edge=int(edge),
                     label=action.label,
                 )
+
+
+def _has_kernels() -> bool:
+    """Whether what increments are compiled with is installed."""
+    return find_spec("numba") is not None
 
 
 def _check_limits(margin: float | None, proof: str, max_evaluations: int | None, deadline: float | None) -> None:

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Generator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -16,20 +15,32 @@ from topobelief.arrays import FloatArray
 from topobelief.errors import IllConditionedError
 from topobelief.graph.action import Action
 from topobelief.planning.decision import Candidate, Decision
-from topobelief.planning.evaluation import ScratchEvaluation
+from topobelief.planning.evaluation import Evaluation
+
+Quantity = Callable[[Sequence[Action]], tuple[FloatArray, FloatArray]]
 
 Progress = Callable[[str, int, int], None]
 """Called with a stage ("signatures", "bounds", "evaluations"), how many actions are done, and out of how many."""
 
 
-@contextmanager
-def naming_action(index: int, action: Action) -> Generator[None]:
-    """Put the action's place before what an `IllConditionedError` says."""
+def named_quantity(quantity: Quantity, actions: Sequence[Action], batch: list[int]) -> tuple[FloatArray, FloatArray]:
+    """A quantity of a batch of actions; an `IllConditionedError` says which action is to blame.
+
+    Raises
+    ------
+    IllConditionedError
+        Names the first action whose quantity double precision cannot give.
+    """
     try:
-        yield
-    except IllConditionedError as error:
-        place = f"action {index}" + (f" ({action.label!r})" if action.label else "")
-        raise IllConditionedError(f"{place}: {error.what}", error.error_estimate) from None
+        return quantity([actions[index] for index in batch])
+    except IllConditionedError:
+        for index in batch:
+            try:
+                quantity([actions[index]])
+            except IllConditionedError as error:
+                label = f" ({actions[index].label!r})" if actions[index].label else ""
+                raise IllConditionedError(f"action {index}{label}: {error.what}", error.error_estimate) from None
+        raise
 
 
 class Clock:
@@ -61,7 +72,7 @@ class Clock:
 class Search:
     """Fills in signatures, then bounds, then exact values; `decision()` may be taken at any time after `rank`."""
 
-    def __init__(self, evaluation: ScratchEvaluation, actions: Sequence[Action], clock: Clock) -> None:
+    def __init__(self, evaluation: Evaluation, actions: Sequence[Action], clock: Clock) -> None:
         self._evaluation, self._actions, self._clock = evaluation, actions, clock
         count = len(actions)
         self._costs = np.array([action.cost for action in actions])
@@ -69,50 +80,51 @@ class Search:
         self._ranking: list[int] = []
 
     def rank(self, *, bounds_too: bool) -> None:
-        """Signatures of all actions and their order; bounds in the same pass if wanted, while the posterior is at hand."""
+        """Signatures of all actions and their order; bounds in the same pass if wanted, while what they share is at hand."""
         rounding = 0.0
-        for index, action in enumerate(self._actions):
-            with naming_action(index, action):
-                evaluation = self._evaluation.of(action)
-                signature = evaluation.signature()
-                self._signatures[index] = signature.value
-                rounding = max(rounding, signature.error)
-                if bounds_too:
-                    self._set_bounds(index, evaluation.bounds())
-            self._clock.report("signatures", index + 1, len(self._actions))
+        for batch in self._batches(range(len(self._actions))):
+            self._signatures[batch], errors = self._of(batch, self._evaluation.signatures)
+            rounding = max(rounding, float(errors.max()))
+            if bounds_too:
+                self._bound(batch)
+            self._clock.report("signatures", batch[-1] + 1, len(self._actions))
         in_nats = self._evaluation.signature == "spanning_trees"
         score = self._signatures - self._costs if in_nats else self._signatures
         self._ranking = _descending(score, tolerance=2 * rounding)
 
     def bound_all(self) -> None:
         """Bounds of all actions, along the ranking, until the deadline."""
-        for done, index in enumerate(self._ranking):
+        done = 0
+        for batch in self._batches(self._ranking):
             if self._clock.expired:
                 return
-            self._bound(index)
-            self._clock.report("bounds", done + 1, len(self._actions))
+            self._bound(batch)
+            done += len(batch)
+            self._clock.report("bounds", done, len(self._actions))
 
     def prove(self, max_evaluations: int) -> None:
-        """Exact values along the ranking, skipping what a lower bound rules out."""
+        """Exact values along the ranking, skipping what a lower bound rules out, in batches that double."""
         if len(self._survivors()) == 1:
             return
-        evaluated = 0
-        for index in self._ranking:
-            if evaluated == max_evaluations or self._clock.expired:
+        evaluated, size = 0, 1
+        while evaluated < max_evaluations and not self._clock.expired:
+            left = [index for index in self._ranking if math.isnan(self._entropies[index])]
+            if evaluated:
+                threshold = self._upper[self._best()]
+                left = [index for index in left if not self._lower[index] > threshold]
+            batch = left[: min(size, max_evaluations - evaluated)]
+            if not batch:
                 return
-            if evaluated and self._lower[index] > self._upper[self._best()]:
-                continue
-            with naming_action(index, self._actions[index]):
-                value = self._evaluation.of(self._actions[index]).entropy()
-            self._entropies[index] = value.value
-            self._set_bounds(index, (value.value - value.error, value.value + value.error))
-            evaluated += 1
-            self._clock.report("evaluations", evaluated, len(self._survivors()))
+            self._entropies[batch], errors = self._of(batch, self._evaluation.entropies)
+            self._set_bounds(batch, self._entropies[batch] - errors, self._entropies[batch] + errors)
+            evaluated += len(batch)
+            size = min(2 * size, self._evaluation.batch_size)
+            self._clock.report("evaluations", evaluated, evaluated + len(left) - len(batch))
 
     def decision_with_margin(self, margin: float) -> Decision:
         """Algorithm 1's first branch: the upper bound of the first of the ranking, and no other."""
         first = self._ranking[0]
-        self._bound(first)
+        self._bound([first])
         self._lower[first] = np.nan
         met = bool(self._upper[first] < margin)
         alone = len(self._actions) == 1
@@ -140,12 +152,19 @@ class Search:
         proven = not open_actions and (evaluated_best or survivors == [best])
         return self._decision(best, survivors, error_bound, proven, margin_met=None)
 
-    def _bound(self, index: int) -> None:
-        with naming_action(index, self._actions[index]):
-            self._set_bounds(index, self._evaluation.of(self._actions[index]).bounds())
+    def _batches(self, indices: Sequence[int]) -> Iterator[list[int]]:
+        size = self._evaluation.batch_size
+        for start in range(0, len(indices), size):
+            yield list(indices[start : start + size])
 
-    def _set_bounds(self, index: int, bounds: tuple[float, float]) -> None:
-        self._lower[index], self._upper[index] = np.add(bounds, self._costs[index])
+    def _bound(self, batch: list[int]) -> None:
+        self._set_bounds(batch, *self._of(batch, self._evaluation.bounds))
+
+    def _set_bounds(self, batch: list[int], lower: FloatArray, upper: FloatArray) -> None:
+        self._lower[batch], self._upper[batch] = lower + self._costs[batch], upper + self._costs[batch]
+
+    def _of(self, batch: list[int], quantity: Quantity) -> tuple[FloatArray, FloatArray]:
+        return named_quantity(quantity, self._actions, batch)
 
     def _best(self) -> int:
         """U^, or the least value once evaluated; the earlier in the ranking where values tie."""

@@ -1,0 +1,318 @@
+"""Forms factored once and asked often: log-determinant, and entries of the inverse between a few nodes.
+
+A form's matrix M = l l^T is factored in b x b blocks along an elimination tree; one tree (order by approximate minimum
+degree, qdldl) serves all forms on the same edges with the same node held. (M^-1)_st = Y_s^T Y_t with Y_t = l^-1 E_t, which
+lives on the way from t to the root of the tree. Stored root first, two paths have in common what lies above their nodes'
+lowest common ancestor, so that an entry of the inverse is one contiguous dot product.
+
+The error estimate of ln det M is that of `log_det`, taken node by node. What is computed from paths belongs to the same
+perturbed matrix M + E as ln det M, and forming the columns of l^-1 perturbs l once more, by no more than the factorisation
+did: whatever adds information to M is known with twice the error of ln det M, for it only shrinks the inverse.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import qdldl
+from scipy import sparse
+
+from topobelief.arrays import BoolArray, FloatArray, IntArray
+from topobelief.linalg.block_cholesky import assemble, factorize, inverse_columns, pull, solve
+from topobelief.linalg.block_pattern import BlockPattern
+from topobelief.linalg.compiled import compiled, in_parallel, num_threads
+from topobelief.linalg.edge_form import EdgeForm, laplacian_form
+from topobelief.linalg.log_det import UNIT_ROUNDOFF, LogDet
+
+_QDLDL: Any = qdldl  # ships no types
+_EXACT_VARIANCE_SIZE = 200  # the constants of log_det's estimate
+_NUM_PROBES = 8
+_PROBE_SAFETY = 2.0
+_CONFIDENCE = 4.0
+_ASSEMBLY_OPERATIONS = 16
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class EliminationTree:
+    """The order in which nodes are eliminated, and what the factor of any form on these edges looks like.
+
+    Attributes
+    ----------
+    edges : shape (m, 2)
+    position : shape (num_nodes,)
+        Place of each node in the elimination, a postorder of the tree; -1 for the node that is held.
+    order : shape (n,)
+        The node at each place.
+    start : shape (n + 1,), rows : shape (nnz,)
+        Compressed columns of the factor below its diagonal, by place; rows ascending.
+    parent, depth : shape (n,)
+        Place of the parent, -1 at a root; number of ancestors.
+    """
+
+    edges: IntArray
+    position: IntArray
+    order: IntArray
+    start: IntArray
+    rows: IntArray
+    parent: IntArray
+    depth: IntArray
+
+    @staticmethod
+    def build(edges: IntArray, num_nodes: int, held: int) -> EliminationTree:
+        """Order all nodes but the one that is held.
+
+        Parameters
+        ----------
+        edges : shape (m, 2)
+        num_nodes, held
+        """
+        edges, position = edges.copy(), np.full(num_nodes, -1)
+        free = np.flatnonzero(np.arange(num_nodes) != held)
+        if len(free) == 0:
+            none = np.zeros(0, np.int64)
+            return EliminationTree(edges, position, none, np.zeros(1, np.int64), none, none, none)
+        pattern = BlockPattern.build(edges, np.arange(num_nodes) != held, 1)
+        parts = _QDLDL.Solver(pattern.upper(laplacian_form(edges, np.ones(len(edges))), shift=1.0), upper=True).factors()
+        lower, order = sparse.csc_array(parts[0]), free[np.asarray(parts[2], dtype=np.int64)]
+        lower.sort_indices()
+        postorder = _postorder(_parents(lower.indptr.astype(np.int64), lower.indices.astype(np.int64)))
+        if (np.diff(postorder) != 1).any():
+            lower, order = sparse.csc_array(lower[postorder][:, postorder]), order[postorder]
+            lower.sort_indices()
+        position[order] = np.arange(len(order))
+        start, rows = lower.indptr.astype(np.int64), lower.indices.astype(np.int64)
+        parent = _parents(start, rows)
+        return EliminationTree(edges, position, order, start, rows, parent, _depths(parent))
+
+    @property
+    def num_free(self) -> int:
+        """n, nodes that are not held."""
+        return len(self.parent)
+
+    def path_sizes(self, places: IntArray, block_size: int) -> IntArray:
+        """Numbers that the path of each place takes."""
+        return block_size**2 * (self.depth[places] + 1)
+
+
+class Paths(NamedTuple):
+    """Y_t = l^-1 E_t for some places t, root first.
+
+    Attributes
+    ----------
+    places : shape (w,)
+        Ascending.
+    start : shape (w,)
+        Y_t^T begins here in `values`: b rows of b length numbers.
+    lengths : shape (w,)
+        Nodes on each path, its own among them.
+    shared : shape (w,)
+        Nodes that the paths of a place and of the next one have in common; 0 for the last.
+    """
+
+    block_size: int
+    places: IntArray
+    start: IntArray
+    lengths: IntArray
+    shared: IntArray
+    values: FloatArray
+
+    def inverse_block(self, s: int, t: int) -> FloatArray:
+        """(M^-1)_st of the s-th and t-th of the places, shape (b, b)."""
+        b = self.block_size
+        low, high = min(s, t), max(s, t)
+        common = int(self.lengths[s]) if s == t else int(self.shared[low:high].min())
+        left, right = (
+            self.values[self.start[k] : self.start[k] + b * b * self.lengths[k]].reshape(b, -1)[:, : b * common] for k in (s, t)
+        )
+        return left @ right.T
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class FormFactor:
+    """M = l l^T of a form on an elimination tree.
+
+    Attributes
+    ----------
+    diagonal : shape (n, b, b), blocks : shape (nnz, b, b)
+        l, by place.
+    log_det
+        ln det M, its multiplicity left out, and its error; inf where the factorisation broke down.
+    """
+
+    tree: EliminationTree
+    diagonal: FloatArray
+    blocks: FloatArray
+    log_det: LogDet
+
+    @staticmethod
+    @np.errstate(over="ignore", divide="ignore", invalid="ignore")  # what is not finite has an infinite error
+    def of(tree: EliminationTree, form: EdgeForm, *, shift: float = 0.0) -> FormFactor:
+        """Factor the form's matrix plus `shift` times I.
+
+        Parameters
+        ----------
+        tree
+            Of the form's edges.
+        form, shift
+        """
+        b, n = form.block_size, tree.num_free
+        diagonal = np.zeros((n, b, b)) + shift * np.eye(b)
+        blocks = np.zeros((len(tree.rows), b, b))
+        rows_i, rows_j = np.ascontiguousarray(form.rows_i), np.ascontiguousarray(form.rows_j)
+        assemble(tree.position, tree.edges, rows_i, rows_j, tree.start, tree.rows, diagonal, blocks)
+        entries = np.diagonal(diagonal, axis1=1, axis2=2).copy()
+        if not factorize((0,) * b, tree.start, tree.rows, diagonal, blocks):
+            return FormFactor(tree, diagonal, blocks, LogDet(math.nan, math.inf))
+        log_pivots = 2 * np.log(np.diagonal(diagonal, axis1=1, axis2=2)).ravel()
+        factor = FormFactor(tree, diagonal, blocks, LogDet(math.fsum(log_pivots), 0.0))
+        error = factor._rounding(form, entries, shift) + float(np.abs(log_pivots).sum())
+        error = UNIT_ROUNDOFF * error + form.root_error
+        return FormFactor(tree, diagonal, blocks, LogDet(factor.log_det.value, error if math.isfinite(error) else math.inf))
+
+    @property
+    def block_size(self) -> int:
+        """b."""
+        return self.diagonal.shape[1]
+
+    def paths(self, places: IntArray) -> Paths:
+        """Paths of some places, given in ascending order and without repetition.
+
+        Parameters
+        ----------
+        places : shape (w,)
+        """
+        tree, b = self.tree, self.block_size
+        sizes = tree.path_sizes(places, b)
+        start = np.concatenate([[0], np.cumsum(sizes)])
+        values = np.empty(int(start[-1]))
+
+        def compute(first: int, last: int) -> None:
+            part = places[first:last]
+            needed = _with_ancestors(tree.parent, part)
+            arguments = (tree.start, tree.rows, tree.depth, self.diagonal, self.blocks, needed, part, values, start[first:last])
+            inverse_columns((0,) * b, *arguments)
+
+        in_parallel(compute, self._fair_bounds(places))
+        shared = _shared_lengths(tree.parent, tree.depth, places)
+        return Paths(b, places, start[:-1], tree.depth[places] + 1, shared, values)
+
+    def _fair_bounds(self, places: IntArray) -> list[int]:
+        """Where to cut a list of places so that every core has as much to do."""
+        tree, parts = self.tree, num_threads()
+        work = np.diff(tree.start) * (tree.depth + 1) * _with_ancestors(tree.parent, places)
+        total = np.cumsum(work)
+        cuts = np.searchsorted(total, total[-1:] * np.arange(1, parts) / parts)
+        return [0, *np.searchsorted(places, cuts).tolist(), len(places)]
+
+    def _rounding(self, form: EdgeForm, entries: FloatArray, shift: float) -> float:
+        """Error of ln det in units of roundoff, without that of the logarithms; see `log_det`."""
+        tree, b = self.tree, self.block_size
+        variances = self._variances(form, shift)
+        ends = tree.position[tree.edges.T.ravel()] + 1
+        squares = np.concatenate([form.magnitude_i, form.magnitude_j]) ** 2
+        magnitude = np.stack(
+            [np.bincount(ends, weights=column, minlength=tree.num_free + 1)[1:] for column in squares.T], axis=1
+        )
+        factored = np.sum(entries * variances, axis=1)  # M_ii v_i^2, by place
+        assembled = np.sum(magnitude * variances, axis=1)  # B_i v_i^2
+        columns = np.repeat(np.arange(tree.num_free), np.diff(tree.start))
+        above = np.bincount(tree.rows, weights=factored[columns], minlength=tree.num_free)
+        operations = b * (np.bincount(tree.rows, minlength=tree.num_free) + 1) + 1
+        squares_of_factor = float((operations * factored) @ (2 * above + factored))
+        padded = np.concatenate([[0.0], assembled])
+        coupled = float(padded[ends[: len(tree.edges)]] @ padded[ends[len(tree.edges) :]] + assembled @ assembled)
+        total = squares_of_factor + _ASSEMBLY_OPERATIONS * b * 2 * coupled
+        return 2 * float(factored.sum() + assembled.sum()) + _CONFIDENCE * math.sqrt(2 * total)
+
+    def _variances(self, form: EdgeForm, shift: float) -> FloatArray:
+        """diag M^-1, shape (n, b): exact for small matrices, else from samples of covariance M^-1, with a safety factor."""
+        tree, b = self.tree, self.block_size
+        if tree.num_free * b <= _EXACT_VARIANCE_SIZE:
+            paths = self.paths(np.arange(tree.num_free))
+            return np.array([np.diagonal(paths.inverse_block(t, t)) for t in range(tree.num_free)]).reshape(-1, b)
+        rng = np.random.default_rng(0)
+        num_edges, num_rows, _ = form.rows_i.shape
+        samples = np.zeros((tree.num_free, b, _NUM_PROBES))
+        signs = _random_signs(rng, (num_edges, num_rows, _NUM_PROBES))
+        pull(tree.position, tree.edges, np.ascontiguousarray(form.rows_i), np.ascontiguousarray(form.rows_j), signs, samples)
+        if shift:
+            samples += math.sqrt(shift) * _random_signs(rng, samples.shape)
+        solve(tree.start, tree.rows, self.diagonal, self.blocks, samples)
+        return _PROBE_SAFETY / _NUM_PROBES * np.sum(samples**2, axis=2)
+
+
+def _random_signs(rng: np.random.Generator, shape: tuple[int, ...]) -> FloatArray:
+    return np.where(rng.integers(2, size=shape, dtype=np.int8), 1.0, -1.0)
+
+
+@compiled
+def _parents(start: IntArray, rows: IntArray) -> IntArray:
+    """First row below the diagonal of each column; -1 where there is none."""
+    parent = np.full(len(start) - 1, -1)
+    for j in range(len(parent)):
+        if start[j] < start[j + 1]:
+            parent[j] = rows[start[j]]
+    return parent
+
+
+@compiled
+def _postorder(parent: IntArray) -> IntArray:
+    """An order in which every subtree is contiguous and children stand before their parents; the identity if that is one."""
+    n = len(parent)
+    child, sibling = np.full(n + 1, -1), np.full(n + 1, -1)
+    for j in range(n - 1, -1, -1):  # children in ascending order; roots hang on node n
+        above = parent[j] if parent[j] >= 0 else n
+        sibling[j], child[above] = child[above], j
+    order, stack = np.empty(n, np.int64), np.empty(n + 1, np.int64)
+    stack[0], height, placed = n, 1, 0
+    while height:
+        node = stack[height - 1]
+        if child[node] >= 0:
+            stack[height] = child[node]
+            child[node] = sibling[child[node]]
+            height += 1
+        else:
+            height -= 1
+            if node < n:
+                order[placed] = node
+                placed += 1
+    return order
+
+
+@compiled
+def _depths(parent: IntArray) -> IntArray:
+    depth = np.zeros(len(parent), np.int64)
+    for j in range(len(parent) - 1, -1, -1):
+        if parent[j] >= 0:
+            depth[j] = depth[parent[j]] + 1
+    return depth
+
+
+@compiled
+def _with_ancestors(parent: IntArray, places: IntArray) -> BoolArray:
+    """The places and all their ancestors, marked."""
+    marked = np.zeros(len(parent), np.bool_)
+    for place in places:
+        node = place
+        while node >= 0 and not marked[node]:
+            marked[node] = True
+            node = parent[node]
+    return marked
+
+
+@compiled
+def _shared_lengths(parent: IntArray, depth: IntArray, places: IntArray) -> IntArray:
+    """Common nodes of the paths of consecutive places (ascending); 0 behind the last."""
+    shared = np.zeros(len(places), np.int64)
+    for k in range(len(places) - 1):
+        a, b = places[k], places[k + 1]
+        while a != b and a >= 0 and b >= 0:
+            if a < b:
+                a = parent[a]
+            else:
+                b = parent[b]
+        shared[k] = depth[a] + 1 if a == b and a >= 0 else 0
+    return shared

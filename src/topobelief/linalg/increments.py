@@ -1,0 +1,188 @@
+"""What extensions of a graph add to the log-determinant of a form that is factored once.
+
+With M the form's matrix on the existing nodes, one of them held, and M' the matrix of the extended graph,
+
+    ln det M' = ln det M + ln det T + ln det (I + R),        R = V V^T + A M^-1 A^T.
+
+T is the block of the new nodes with the forest's edges alone and the existing nodes held; [V A] are the closures as rows on the
+independent unit noise of the forest's nodes, and on existing nodes, to which the forest leads them back. Both terms are
+increments, never differences of two large numbers; entries of M^-1 come from paths in the elimination tree. With the existing
+nodes held, ln det T + ln det (I + V V^T) is left, the block of the new nodes. Edges with more rows than variables are brought
+to square rows; what is left over stands on a new node alone where there is one, and costs nothing.
+
+Errors, beyond those of M (see `elimination_paths`): R is computed from rows that are known to a few roundings each, and
+I + R >= I, so that ln det (I + R) is off by a few units of roundoff times the trace of I + R, taken as if no terms cancelled;
+ln det T by as many times the condition numbers of the triangles of which it is the product.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from topobelief.arrays import FloatArray, IntArray
+from topobelief.linalg.compiled import compiled, in_parallel, num_threads
+from topobelief.linalg.edge_form import EdgeForm
+from topobelief.linalg.elimination_paths import FormFactor, Paths
+from topobelief.linalg.extensions import Extensions
+from topobelief.linalg.increment_kernels import add_diagonal_increments, add_increments
+from topobelief.linalg.log_det import UNIT_ROUNDOFF
+
+_PATH_NUMBERS = 16_000_000  # numbers that the paths of one group of extensions may take: 128 MB
+_PARTS_PER_THREAD = 4
+_OPERATIONS = 32  # roundings behind one term of R
+_may_overflow = np.errstate(over="ignore", invalid="ignore")  # what is not finite is refused
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Increments:
+    """What each extension adds to ln det M, multiplicity left out; nan where rounding left no positive definite matrix.
+
+    Attributes
+    ----------
+    forest : shape (K,)
+        ln det T.
+    closures : shape (K,)
+        ln det (I + R).
+    closures_held : shape (K,)
+        ln det (I + V V^T): existing nodes held.
+    first_rows, other_rows : shape (K,)
+        ln det (I + R) of the first rows of each closure alone, and of the others; 0 where `split` is.
+    error : shape (K,)
+        Rounding of the sum, beyond twice the error of ln det M.
+    split
+        How many of a closure's rows come first; 0 where the parts were not asked for.
+    """
+
+    forest: FloatArray
+    closures: FloatArray
+    closures_held: FloatArray
+    first_rows: FloatArray
+    other_rows: FloatArray
+    error: FloatArray
+    split: int
+
+
+@_may_overflow
+def log_det_increments(
+    factor: FormFactor | None, extensions: Extensions, form: EdgeForm, *, shift: float = 0.0, split: int = 0
+) -> Increments:
+    """Increments of ln det M by each extension.
+
+    Parameters
+    ----------
+    factor
+        Of the form on the existing graph. None: all existing nodes are held.
+    extensions
+    form
+        Rows of the extensions' edges.
+    shift
+        As in the factor: added to the diagonal of new nodes.
+    split
+        If not 0: also for the first `split` rows of each closure alone and for the others; square rows only.
+    """
+    out = np.zeros((extensions.num_extensions, 6))
+    rows_i, rows_j = np.ascontiguousarray(form.rows_i), np.ascontiguousarray(form.rows_j)
+    path_of = np.full(extensions.num_existing, -1)
+    for which in [np.arange(extensions.num_extensions)] if factor is None else _groups(factor, extensions):
+        paths = _no_paths(form.block_size) if factor is None else _paths(factor, extensions, which, path_of)
+
+        def add(first: int, last: int, which: IntArray = which, paths: Paths = paths) -> None:
+            add_increments(extensions, rows_i, rows_j, shift, path_of, paths, split, which[first:last], out)
+
+        parts = min(len(which), _PARTS_PER_THREAD * num_threads())
+        in_parallel(add, np.linspace(0, len(which), parts + 1).astype(int).tolist())
+    forest, closures, held, first_rows, other_rows, size = np.ascontiguousarray(out.T)
+    error = UNIT_ROUNDOFF * (_OPERATIONS * size + np.abs(forest) + np.abs(closures)) + form.root_error
+    return Increments(forest, closures, held, first_rows, other_rows, error, split)
+
+
+@_may_overflow
+def diagonal_increments(
+    existing: EdgeForm, held: int, extensions: Extensions, form: EdgeForm, shift: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """What each extension adds to the sum of ln det of the diagonal blocks, and its rounding error, each of shape (K,).
+
+    Parameters
+    ----------
+    existing
+        The form on the existing graph.
+    held
+        Node whose block is left out.
+    extensions
+    form
+        Rows of the extensions' edges.
+    shift : shape (K,)
+        Added to the diagonal of all blocks, of existing and new nodes.
+    """
+    b = form.block_size
+    diagonal = np.zeros((extensions.num_existing, b, b))
+    for ends, rows in zip(existing.edges.T, (existing.rows_i, existing.rows_j), strict=True):
+        np.add.at(diagonal, ends, rows.transpose(0, 2, 1) @ rows)
+    out = np.zeros(extensions.num_extensions)
+    rows_i, rows_j = np.ascontiguousarray(form.rows_i), np.ascontiguousarray(form.rows_j)
+    add_diagonal_increments(extensions, rows_i, rows_j, shift, diagonal, held, out)
+    terms = 2 * np.diff(extensions.edge_start) * b * b
+    return out, UNIT_ROUNDOFF * (_OPERATIONS * terms + np.abs(out)) + form.root_error
+
+
+def _no_paths(block_size: int) -> Paths:
+    none = np.zeros(0, np.int64)
+    return Paths(block_size, none, none, none, none, np.zeros(0))
+
+
+def _paths(factor: FormFactor, extensions: Extensions, which: IntArray, path_of: IntArray) -> Paths:
+    """Paths of the existing nodes that some extensions touch; `path_of` is updated."""
+    places = _touched(extensions.edges, extensions.edge_start, factor.tree.position, which)
+    path_of[:] = -1
+    path_of[factor.tree.order[places]] = np.arange(len(places))
+    return factor.paths(places)
+
+
+def _groups(factor: FormFactor, extensions: Extensions) -> list[IntArray]:
+    """Extensions in groups whose paths fit into memory; neighbours in the tree stand together, so that they share paths."""
+    tree = factor.tree
+    ends = extensions.edges.ravel()
+    place = np.where(ends < extensions.num_existing, tree.position[np.minimum(ends, extensions.num_existing - 1)], -1)
+    sums = np.concatenate([[0], np.cumsum(np.maximum(place, 0))])
+    counts = np.concatenate([[0], np.cumsum(place >= 0)])
+    first, last = 2 * extensions.edge_start[:-1], 2 * extensions.edge_start[1:]
+    which = np.argsort((sums[last] - sums[first]) / np.maximum(counts[last] - counts[first], 1), kind="stable")
+    sizes = tree.path_sizes(np.arange(tree.num_free), factor.block_size)
+    return np.split(which, _cuts(extensions.edges, extensions.edge_start, tree.position, which, sizes, _PATH_NUMBERS))
+
+
+@compiled
+def _touched(edges: IntArray, edge_start: IntArray, position: IntArray, which: IntArray) -> IntArray:
+    """Places of the existing nodes that some extensions touch, ascending."""
+    marked = np.zeros(len(position), np.bool_)
+    for k in which:
+        for e in range(edge_start[k], edge_start[k + 1]):
+            for side in range(2):
+                if edges[e, side] < len(position) and position[edges[e, side]] >= 0:
+                    marked[position[edges[e, side]]] = True
+    return np.flatnonzero(marked)
+
+
+@compiled
+def _cuts(edges: IntArray, edge_start: IntArray, position: IntArray, which: IntArray, sizes: IntArray, limit: int) -> IntArray:
+    """Where to cut a list of extensions so that the paths of each piece take no more than `limit` numbers."""
+    cuts, piece, total = np.empty(len(which), np.int64), 0, 0
+    seen = np.full(len(position), -1)  # the last piece that touches a node
+    for n in range(len(which)):
+        added = 0
+        for _ in range(2):
+            added = 0
+            for e in range(edge_start[which[n]], edge_start[which[n] + 1]):
+                for side in range(2):
+                    node = edges[e, side]
+                    if node < len(position) and position[node] >= 0 and seen[node] != piece:
+                        seen[node] = piece
+                        added += sizes[position[node]]
+            if total == 0 or total + added <= limit:
+                break
+            cuts[piece] = n
+            piece, total = piece + 1, 0
+        total += added
+    return cuts[:piece]

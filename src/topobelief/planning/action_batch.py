@@ -1,0 +1,119 @@
+"""Many actions as one: their new poses and edges stacked, so that rows and signature weights are computed for all at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from topobelief.arrays import FloatArray, IntArray
+from topobelief.graph.action import Action
+from topobelief.graph.fisher import FisherRows, fisher_rows
+from topobelief.graph.information import scalar_weights
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.graph.topology import Topology
+from topobelief.linalg.extensions import Extensions
+
+
+@dataclass(frozen=True)
+class ActionBatch:
+    """Checked actions on one prior.
+
+    Parameters
+    ----------
+    graph
+        The prior, n poses.
+    actions
+        K of them.
+    """
+
+    graph: PoseGraph
+    actions: tuple[Action, ...]
+
+    def holds(self, actions: Sequence[Action]) -> bool:
+        """Whether these are the very same actions."""
+        return len(actions) == len(self.actions) and all(a is b for a, b in zip(actions, self.actions, strict=True))
+
+    def places(self, actions: Sequence[Action]) -> list[int] | None:
+        """Where these very actions stand in the batch; None if one is not in it."""
+        places = [self._place.get(id(action)) for action in actions]
+        return [place for place in places if place is not None] if None not in places else None
+
+    @cached_property
+    def _place(self) -> dict[int, int]:
+        return {id(action): place for place, action in enumerate(self.actions)}
+
+    @property
+    def count(self) -> int:
+        """K."""
+        return len(self.actions)
+
+    @cached_property
+    def num_new(self) -> IntArray:
+        """New poses of each action, shape (K,)."""
+        return np.array([action.num_new_poses for action in self.actions])
+
+    @cached_property
+    def num_edges(self) -> IntArray:
+        """Edges of each action, shape (K,)."""
+        return np.array([len(action.edges) for action in self.actions])
+
+    @cached_property
+    def edge_start(self) -> IntArray:
+        """Where the edges of each action begin, shape (K + 1,)."""
+        return np.concatenate([[0], np.cumsum(self.num_edges)])
+
+    @cached_property
+    def edges(self) -> IntArray:
+        """All edges as the actions have them, shape (number of edges, 2)."""
+        return np.concatenate([action.edges for action in self.actions])
+
+    @cached_property
+    def extensions(self) -> Extensions:
+        """The same edges, with new poses counted through the batch."""
+        n, node_start = self.graph.num_poses, np.concatenate([[0], np.cumsum(self.num_new)])
+        shift = np.repeat(node_start[:-1], self.num_edges)[:, None]
+        edges = np.where(self.edges >= n, self.edges + shift, self.edges)
+        return Extensions.of(n, edges, self.edge_start, node_start)
+
+    @cached_property
+    def information(self) -> FloatArray:
+        """Information matrices of all edges, (number of edges, kappa, kappa)."""
+        kappa = self.graph.tangent_dim  # an action without edges need not know it
+        return np.concatenate(
+            [np.zeros((0, kappa, kappa)), *(action.information for action in self.actions if len(action.edges))]
+        )
+
+    @cached_property
+    def rows(self) -> FisherRows:
+        """Whitened rows of all edges."""
+        edges = self.extensions.edges
+        poses = np.concatenate([self.graph.poses, *(action.poses for action in self.actions if action.num_new_poses)])
+        stacked = PoseGraph._from_checked(  # pyright: ignore[reportPrivateUsage]
+            Topology(len(poses), edges), poses, np.zeros((0, 0)), self.information, np.zeros(0, np.int64), ()
+        )
+        return fisher_rows(stacked)
+
+    @cached_property
+    def scalar_weights(self) -> tuple[FloatArray, FloatArray]:
+        """(w_p, w_r) of all edges."""
+        return scalar_weights_of(self.rows.weights, self.information)
+
+    def sums(self, values: FloatArray) -> FloatArray:
+        """Sum over each action's edges, shape (K,)."""
+        total = np.concatenate([[0.0], np.cumsum(values)])
+        return total[self.edge_start[1:]] - total[self.edge_start[:-1]]
+
+
+def scalar_weights_of(
+    isotropic: tuple[FloatArray, FloatArray] | None, information: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """(w_p, w_r) of edges, as spanning-tree signatures take them; computed once where all edges share one matrix."""
+    if isotropic is not None:
+        return isotropic
+    if len(information) and (information == information[0]).all():
+        w_p, w_r = scalar_weights(information[:1])
+        return np.repeat(w_p, len(information)), np.repeat(w_r, len(information))
+    return scalar_weights(information)

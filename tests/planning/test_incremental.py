@@ -1,0 +1,295 @@
+"""Many actions at once against one at a time from scratch, dense formulas and exact arithmetic."""
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from graphs import SE2_GROUP, SE3_GROUP, Noise, random_action, random_pose_graph, sessions, shares_isotropic_noise
+from references import LOG_2_PI_E, log_det_exact
+from topobelief.errors import IllConditionedError, InvalidGraphError
+from topobelief.graph.action import Action, posterior
+from topobelief.graph.fisher import fisher_rows
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.planning import incremental, posterior_forms
+from topobelief.planning.action_batch import ActionBatch
+from topobelief.planning.evaluation import ScratchEvaluation
+from topobelief.planning.incremental import IncrementalEvaluation
+
+OBJECTIVES = ("joint", "map", "per_pose")
+SIGNATURES = ("spanning_trees", "von_neumann", "von_neumann_approx")
+seeds = st.integers(0, 2**32 - 1)
+
+
+def evaluation(graph, kind=IncrementalEvaluation, **settings):
+    defaults = {"objective": "joint", "signature": "spanning_trees", "normalized": False, "family": "fischer"}
+    return kind(graph, **(defaults | {"determinant": "cholesky", "anchor": graph.num_poses - 1} | settings))
+
+
+def from_scratch(graph, actions, **settings):
+    """Signatures, lower and upper bounds, entropies and their errors, each action alone."""
+    session = evaluation(graph, ScratchEvaluation, **settings)
+    of = [session.of(action) for action in actions]
+    lower, upper = np.array([each.bounds() for each in of]).T
+    entropies = [each.entropy() for each in of]
+    return (
+        np.array([each.signature().value for each in of]),
+        lower,
+        upper,
+        np.array([entropy.value for entropy in entropies]),
+        np.array([entropy.error for entropy in entropies]),
+    )
+
+
+@given(
+    sessions(log_ratio=(-3.0, 2.0)),
+    st.sampled_from(OBJECTIVES),
+    st.sampled_from(SIGNATURES),
+    st.sampled_from(["fischer", "paper"]),
+    st.sampled_from(["cholesky", "hadamard"]),
+    st.booleans(),
+    seeds,
+)
+def test_all_quantities_are_those_from_scratch(session, objective, signature, family, determinant, normalized, seed):
+    graph, actions = session.graph, session.actions
+    assume(family == "fischer" or shares_isotropic_noise(session))
+    settings = {"objective": objective, "signature": signature, "family": family, "determinant": determinant}
+    settings |= {"normalized": normalized, "anchor": int(np.random.default_rng(seed).integers(graph.num_poses))}
+    signatures, lower, upper, entropies, errors = from_scratch(graph, actions, **settings)
+    found = evaluation(graph, **settings)
+    np.testing.assert_allclose(found.signatures(actions)[0], signatures, rtol=1e-9, atol=1e-9)
+    values, found_errors = found.entropies(actions)
+    np.testing.assert_allclose(values, entropies, rtol=1e-9, atol=1e-9)
+    widths = 4 * (errors + found_errors).max()  # bounds are widened by errors that the two estimate differently
+    for ours, theirs in zip(found.bounds(actions), (lower, upper), strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9 + widths)
+
+
+@given(
+    sessions(log_ratio=(-3.0, 5.0), max_actions=3),
+    st.sampled_from(["fischer", "anchored"]),
+    st.sampled_from(["cholesky", "hadamard"]),
+    seeds,
+)
+def test_bounds_and_errors_hold_in_exact_arithmetic_at_any_condition(session, family, determinant, seed):
+    graph, actions = session.graph, session.actions
+    anchor = int(np.random.default_rng(seed).integers(graph.num_poses))
+    found = evaluation(graph, family=family, determinant=determinant, anchor=anchor)
+    for action in actions:
+        after = posterior(graph, action)
+        log_det = float(log_det_exact(after, "joint", held=anchor))
+        exact = (after.num_poses - 1) * after.tangent_dim / 2 * LOG_2_PI_E - log_det / 2
+        rounding = 1e-14 * (abs(exact) + abs(log_det))  # of the reference, as a double
+        try:
+            (value,), (error,) = found.entropies([action])
+            (lower,), (upper,) = found.bounds([action])
+        except IllConditionedError:
+            continue
+        assert abs(value - exact) <= error + rounding
+        assert lower <= exact + rounding
+        assert upper >= exact - rounding
+
+
+@given(sessions(log_ratio=(-3.0, 2.0)), st.sampled_from(OBJECTIVES), seeds)
+def test_anchored_bounds_hold_and_meet_where_nothing_is_closed(session, objective, seed):
+    graph, actions = session.graph, session.actions
+    anchor = int(np.random.default_rng(seed).integers(graph.num_poses))
+    found = evaluation(graph, family="anchored", objective=objective, anchor=anchor)
+    lower, upper = found.bounds(actions)
+    values, errors = found.entropies(actions)
+    assert (lower <= values + errors).all()
+    assert (values - errors <= upper).all()
+    for k, action in enumerate(actions):
+        if action.num_closures == 0:
+            assert lower[k] == values[k] - errors[k]
+            assert upper[k] == values[k] + errors[k]
+
+
+@given(sessions(log_ratio=(-2.0, 1.0)), seeds)
+def test_anchored_bounds_are_section_8_s_formulas(session, seed):
+    graph, actions = session.graph, session.actions
+    anchor = int(np.random.default_rng(seed).integers(graph.num_poses))
+    k = graph.group.position_dim
+    lower, upper = evaluation(graph, family="anchored", anchor=anchor).bounds(actions)
+    batch = ActionBatch(graph, actions)
+    for n, action in enumerate(actions):
+        after = posterior(graph, action)
+        planted = batch.extensions.planted[batch.edge_start[n] : batch.edge_start[n + 1]]
+        in_base = np.r_[np.ones(graph.num_edges, bool), planted]
+        joint = dense_rows(fisher_rows(after).joint(), after.num_poses, anchor)
+        closures = joint[~in_base]
+        base = information(joint[in_base])
+        variables = np.arange(len(base)).reshape(-1, graph.tangent_dim)
+        positions = variables[:, :k].ravel()
+        seen_p, seen_r = (matrix(closures[:, part]) for part in (slice(None, k), slice(k, None)))
+        log_det = np.linalg.slogdet(base)[1]
+        p = log_det_of_increment(seen_p, base)
+        r = log_det_of_increment(seen_r, base)
+        p_given_r = log_det_of_increment(seen_p[:, positions], base[np.ix_(positions, positions)])
+        constant = (after.num_poses - 1) * graph.tangent_dim / 2 * LOG_2_PI_E
+        assert lower[n] == pytest.approx(constant - (log_det + p + r) / 2, rel=1e-7, abs=1e-6)
+        assert upper[n] == pytest.approx(constant - (log_det + p_given_r + r) / 2, rel=1e-7, abs=1e-6)
+
+
+def dense_rows(form, num_poses, anchor):
+    """Whitened rows on all variables but the anchor's, (m, r, variables)."""
+    m, r, b = form.rows_i.shape
+    rows = np.zeros((m, r, num_poses, b))
+    rows[np.arange(m), :, form.edges[:, 0]] = form.rows_i
+    rows[np.arange(m), :, form.edges[:, 1]] = form.rows_j
+    return np.delete(rows, anchor, axis=2).reshape(m, r, (num_poses - 1) * b)
+
+
+def matrix(rows):
+    return rows.reshape(rows.shape[0] * rows.shape[1], rows.shape[2])
+
+
+def information(rows):
+    return matrix(rows).T @ matrix(rows)
+
+
+def log_det_of_increment(rows, base):
+    """ln det (I + rows base^-1 rows^T)."""
+    return np.linalg.slogdet(np.eye(len(rows)) + rows @ np.linalg.solve(base, rows.T))[1] if len(base) else 0.0
+
+
+def a_session(group=SE2_GROUP, kind="equal", *, num_poses=40, num_actions=12, seed=0):
+    rng = np.random.default_rng(seed)
+    noise = Noise(group, kind, 100.0, 0.4, 2.0)
+    graph = random_pose_graph(rng, noise, num_poses, num_poses // 2)
+    return graph, [random_action(rng, graph, noise, max_new=10, max_closures=8) for _ in range(num_actions)]
+
+
+@pytest.mark.parametrize("family", ["fischer", "anchored"])
+@pytest.mark.parametrize("group", [SE2_GROUP, SE3_GROUP])
+@pytest.mark.parametrize("kind", ["isotropic", "full"])
+def test_neither_their_order_nor_their_company_changes_actions(family, group, kind):
+    graph, actions = a_session(group, kind)
+    together = evaluation(graph, family=family)
+    expected = [*together.signatures(actions), *together.bounds(actions), *together.entropies(actions)]
+    turned = evaluation(graph, family=family)
+    found = [*turned.signatures(actions[::-1]), *turned.bounds(actions[::-1]), *turned.entropies(actions[::-1])]
+    for ours, theirs in zip(found, expected, strict=True):
+        np.testing.assert_allclose(ours[::-1], theirs, rtol=1e-12, atol=1e-11)
+    alone = evaluation(graph, family=family)
+    for n, action in enumerate(actions):
+        one = [*alone.signatures([action]), *alone.bounds([action]), *alone.entropies([action])]
+        np.testing.assert_allclose(np.ravel(one), [values[n] for values in expected], rtol=1e-12, atol=1e-11)
+
+
+OMEGA = np.diag([100.0, 100.0, 400.0])
+PRIOR = PoseGraph(
+    [[0, 0, 0], [2, 0, 0.5], [3, 2, 1.5], [1, 3, 3.0], [-1, 2, -2.0]],
+    [(0, 1), (1, 2), (2, 3), (3, 4), (4, 0), (1, 3)],
+    None,
+    OMEGA,
+)
+NAMED = {
+    "stay": Action(np.zeros((0, 3)), [], OMEGA),
+    "explore": Action([[0, 4, 0], [1, 5, 0]], [(4, 5), (5, 6)], OMEGA),
+    "a chain from another pose": Action([[4, 1, 0], [5, 1, 0]], [(1, 5), (5, 6), (6, 2)], OMEGA),
+    "a branch": Action([[0, 4, 0], [1, 5, 0], [-1, 5, 2]], [(4, 5), (5, 6), (5, 7), (6, 3), (7, 2)], OMEGA),
+    "two chains": Action([[0, 4, 0], [4, 1, 0]], [(4, 5), (1, 6), (6, 5)], OMEGA),
+    "closures stored old to new": Action([[0, 4, 0], [1, 5, 0]], [(5, 4), (6, 5), (2, 6), (0, 5)], OMEGA),
+    "closures among new poses": Action([[0, 4, 0], [1, 5, 0], [2, 4, 1]], [(4, 5), (5, 6), (6, 7), (7, 5)], OMEGA),
+    "measurements alone": Action(np.zeros((0, 3)), [(0, 2), (4, 2)], OMEGA),
+    "what is there already": Action(np.zeros((0, 3)), [(0, 1), (0, 1), (1, 0)], OMEGA),
+    "parallel closures": Action([[0, 4, 0]], [(4, 5), (5, 0), (5, 0), (0, 5)], OMEGA),
+    "stems that are parallel": Action([[0, 4, 0]], [(4, 5), (4, 5), (5, 4)], OMEGA),
+    "other noise": Action([[0, 4, 0]], [(4, 5), (5, 0)], [np.diag([1.0, 5.0, 2.0]), OMEGA + 7.0]),
+}
+
+
+@pytest.mark.parametrize("anchor", [0, 2, 4])
+@pytest.mark.parametrize("objective", OBJECTIVES)
+def test_every_shape_of_action(anchor, objective):
+    actions = list(NAMED.values())
+    settings = {"anchor": anchor, "objective": objective}
+    signatures, lower, upper, entropies, _ = from_scratch(PRIOR, actions, **settings)
+    found = evaluation(PRIOR, **settings)
+    np.testing.assert_allclose(found.signatures(actions)[0], signatures, rtol=1e-12)
+    np.testing.assert_allclose(found.entropies(actions)[0], entropies, rtol=1e-12)
+    np.testing.assert_allclose(found.bounds(actions), [lower, upper], rtol=1e-11)
+    same_noise = actions[:-1]  # scalar Laplacians instead of blocks
+    np.testing.assert_allclose(evaluation(PRIOR, **settings).bounds(same_noise), [lower[:-1], upper[:-1]], rtol=1e-11)
+    for family in ("paper", "anchored"):
+        low, high = evaluation(PRIOR, family=family, **settings).bounds(same_noise)
+        assert (low <= entropies[:-1] + 1e-9).all()
+        assert (high >= entropies[:-1] - 1e-9).all()
+
+
+def test_a_prior_of_one_pose():
+    prior = PoseGraph([[0, 0, 0]], [], None, OMEGA)
+    actions = [
+        Action([[1, 0, 0], [2, 1, 1]], [(0, 1), (1, 2), (2, 0)], OMEGA),
+        Action(np.zeros((0, 3)), [], OMEGA),
+        Action([[1, 0, 0]], [(1, 0), (0, 1)], 4 * OMEGA),
+    ]
+    for family in ("fischer", "anchored"):
+        signatures, lower, upper, entropies, _ = from_scratch(prior, actions)
+        found = evaluation(prior, family=family)
+        np.testing.assert_allclose(found.signatures(actions)[0], signatures, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(found.entropies(actions)[0], entropies, rtol=1e-12, atol=1e-12)
+        if family == "fischer":
+            np.testing.assert_allclose(found.bounds(actions), [lower, upper], rtol=1e-12, atol=1e-12)
+
+
+def test_the_paper_s_family_where_an_action_raises_psi():
+    """One factor serves the actions that leave Psi as it is; the others are bounded from scratch."""
+    far = Action([[0, 4, 0], [30, 40, 0]], [(4, 5), (5, 6), (6, 0), (6, 1)], OMEGA)
+    for determinant in ("cholesky", "hadamard"):
+        settings = {"family": "paper", "determinant": determinant}
+        for actions in ([NAMED["explore"], far, NAMED["parallel closures"]], [NAMED["stay"]]):
+            _, lower, upper, _, _ = from_scratch(PRIOR, actions, **settings)
+            np.testing.assert_allclose(evaluation(PRIOR, **settings).bounds(actions), [lower, upper], rtol=1e-12)
+    with pytest.raises(InvalidGraphError, match="paper's bounds expect"):
+        evaluation(PRIOR, family="paper").bounds([NAMED["other noise"]])
+
+
+def test_the_prior_is_factored_once_a_session(monkeypatch):
+    factored = []
+    of = posterior_forms.FormFactor.of
+    monkeypatch.setattr(posterior_forms.FormFactor, "of", lambda *args, **more: factored.append(0) or of(*args, **more))
+    graph, actions = a_session()
+    found = evaluation(graph)
+    for batch in (actions, actions[:3], actions[3:]):
+        found.signatures(batch)
+        found.bounds(batch)
+        found.entropies(batch)
+    assert len(factored) == 3  # one Laplacian for the signature, I_pp and L_r|p; I_rr; I
+
+
+def test_bounds_share_the_signature_s_increments_and_exact_values_those_of_anchored_bounds(monkeypatch):
+    added = []
+    increments = posterior_forms.log_det_increments
+    monkeypatch.setattr(posterior_forms, "log_det_increments", lambda *a, **more: added.append(0) or increments(*a, **more))
+    graph, actions = a_session()
+    found = evaluation(graph, family="anchored")
+    found.signatures(actions)
+    found.bounds(actions)
+    assert len(added) == 2
+    values, errors = found.entropies(actions)
+    again, _ = found.entropies(actions[2:5])
+    assert len(added) == 2
+    np.testing.assert_array_equal(again, values[2:5])
+    expected, _ = evaluation(graph).entropies(actions)
+    np.testing.assert_allclose(values, expected, rtol=1e-14, atol=errors.max())
+
+
+def test_an_action_that_closes_too_many_loops_for_a_dense_matrix_is_evaluated_from_scratch(monkeypatch):
+    graph, actions = a_session(num_poses=12)
+    monkeypatch.setattr(incremental, "_MAX_CLOSURE_ROWS", 12)
+    assert min(action.num_closures for action in actions) * 3 <= 12 < max(action.num_closures for action in actions) * 3
+    signatures, lower, upper, entropies, _ = from_scratch(graph, actions)
+    found = evaluation(graph)
+    np.testing.assert_allclose(found.signatures(actions)[0], signatures, rtol=1e-12)
+    np.testing.assert_allclose(found.bounds(actions), [lower, upper], rtol=1e-10)
+    np.testing.assert_allclose(found.entropies(actions)[0], entropies, rtol=1e-12)
+
+
+def test_a_prior_that_double_precision_cannot_factor_is_refused():
+    poses = 1e6 * np.random.default_rng(0).normal(size=(1300, 3))
+    edges = [(i, i + 1) for i in range(1299)] + [(0, 700)]
+    prior = PoseGraph(poses, edges, None, np.diag([1e8, 1e8, 1e-8]))
+    with pytest.raises(IllConditionedError):
+        evaluation(prior).entropies([Action(np.zeros((0, 3)), [(3, 900)], np.diag([1e8, 1e8, 1e-8]))])
