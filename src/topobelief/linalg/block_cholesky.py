@@ -16,9 +16,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from topobelief.arrays import BoolArray, FloatArray, IntArray
 from topobelief.linalg.compiled import compiled
+
+Int32Array = NDArray[np.int32]  # a large factor has many rows
 
 
 @compiled
@@ -28,7 +31,7 @@ def assemble(
     rows_i: FloatArray,
     rows_j: FloatArray,
     start: IntArray,
-    rows: IntArray,
+    rows: Int32Array,
     diagonal: FloatArray,
     blocks: FloatArray,
 ) -> None:
@@ -88,7 +91,7 @@ def pull(
 @compiled
 def subtract_columns(
     axes: tuple[int, ...],
-    rows: IntArray,
+    rows: Int32Array,
     blocks: FloatArray,
     column: int,
     last: int,
@@ -133,7 +136,7 @@ def subtract_columns(
 
 
 @compiled
-def factorize(axes: tuple[int, ...], start: IntArray, rows: IntArray, diagonal: FloatArray, blocks: FloatArray) -> bool:
+def factorize(axes: tuple[int, ...], start: IntArray, rows: Int32Array, diagonal: FloatArray, blocks: FloatArray) -> bool:
     """Replace the blocks of M by those of l, column by column, left-looking; False where a pivot is not positive.
 
     Columns that follow each other with the same rows (a supernode) wait together for the row at which they are needed next.
@@ -150,10 +153,10 @@ def factorize(axes: tuple[int, ...], start: IntArray, rows: IntArray, diagonal: 
     for j in range(n):
         if j > 0 and last[j - 1] != last[j]:
             first = j
-        waiting = head[j]
+        waiting = int(head[j])
         while waiting >= 0:
-            following, count = link[waiting], left[waiting]
-            subtract_columns(axes, rows, blocks, waiting, last[waiting], start, count, work)
+            following, count = int(link[waiting]), int(left[waiting])
+            subtract_columns(axes, rows, blocks, waiting, int(last[waiting]), start, count, work)
             left[waiting] -= 1
             if count > 1:
                 row = rows[start[last[waiting] + 1] - count + 1]
@@ -197,7 +200,7 @@ def factorize(axes: tuple[int, ...], start: IntArray, rows: IntArray, diagonal: 
 
 
 @compiled
-def solve(start: IntArray, rows: IntArray, diagonal: FloatArray, blocks: FloatArray, values: FloatArray) -> None:
+def solve(start: IntArray, rows: Int32Array, diagonal: FloatArray, blocks: FloatArray, values: FloatArray) -> None:
     """Replace `values`, shape (n, b, s) in order of elimination, by M^-1 values."""
     n, b, s = values.shape
     for j in range(n):
@@ -269,7 +272,7 @@ def subtract_paths(
 def inverse_columns(
     axes: tuple[int, ...],
     start: IntArray,
-    rows: IntArray,
+    rows: Int32Array,
     depth: IntArray,
     diagonal: FloatArray,
     blocks: FloatArray,

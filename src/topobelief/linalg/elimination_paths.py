@@ -18,10 +18,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import qdldl
-from scipy import sparse
 
 from topobelief.arrays import BoolArray, FloatArray, IntArray
-from topobelief.linalg.block_cholesky import assemble, factorize, inverse_columns, pull, solve
+from topobelief.linalg.block_cholesky import Int32Array, assemble, factorize, inverse_columns, pull, solve
 from topobelief.linalg.block_pattern import BlockPattern
 from topobelief.linalg.compiled import compiled, in_parallel, num_threads
 from topobelief.linalg.edge_form import EdgeForm, laplacian_form
@@ -56,7 +55,7 @@ class EliminationTree:
     position: IntArray
     order: IntArray
     start: IntArray
-    rows: IntArray
+    rows: Int32Array
     parent: IntArray
     depth: IntArray
 
@@ -73,17 +72,15 @@ class EliminationTree:
         free = np.flatnonzero(np.arange(num_nodes) != held)
         if len(free) == 0:
             none = np.zeros(0, np.int64)
-            return EliminationTree(edges, position, none, np.zeros(1, np.int64), none, none, none)
+            return EliminationTree(edges, position, none, np.zeros(1, np.int64), none.astype(np.int32), none, none)
         pattern = BlockPattern.build(edges, np.arange(num_nodes) != held, 1)
-        parts = _QDLDL.Solver(pattern.upper(laplacian_form(edges, np.ones(len(edges))), shift=1.0), upper=True).factors()
-        lower, order = sparse.csc_array(parts[0]), free[np.asarray(parts[2], dtype=np.int64)]
-        lower.sort_indices()
-        postorder = _postorder(_parents(lower.indptr.astype(np.int64), lower.indices.astype(np.int64)))
-        if (np.diff(postorder) != 1).any():
-            lower, order = sparse.csc_array(lower[postorder][:, postorder]), order[postorder]
-            lower.sort_indices()
+        any_form = pattern.upper(laplacian_form(edges, np.ones(len(edges))), shift=1.0)
+        lower, _, order = _QDLDL.Solver(any_form, upper=True).factors()
+        start, rows = lower.indptr.astype(np.int64), lower.indices.astype(np.int32)
+        postorder = _postorder(_parents(start, rows))
+        start, rows = _permuted(start, rows, postorder)
+        order = free[np.asarray(order, dtype=np.int64)[postorder]]
         position[order] = np.arange(len(order))
-        start, rows = lower.indptr.astype(np.int64), lower.indices.astype(np.int64)
         parent = _parents(start, rows)
         return EliminationTree(edges, position, order, start, rows, parent, _depths(parent))
 
@@ -218,10 +215,9 @@ class FormFactor:
         )
         factored = np.sum(entries * variances, axis=1)  # M_ii v_i^2, by place
         assembled = np.sum(magnitude * variances, axis=1)  # B_i v_i^2
-        columns = np.repeat(np.arange(tree.num_free), np.diff(tree.start))
-        above = np.bincount(tree.rows, weights=factored[columns], minlength=tree.num_free)
-        operations = b * (np.bincount(tree.rows, minlength=tree.num_free) + 1) + 1
-        squares_of_factor = float((operations * factored) @ (2 * above + factored))
+        columns, coupled_to = _row_sums(tree.start, tree.rows, factored)
+        operations = b * (columns + 1) + 1
+        squares_of_factor = float((operations * factored) @ (2 * coupled_to + factored))
         padded = np.concatenate([[0.0], assembled])
         coupled = float(padded[ends[: len(tree.edges)]] @ padded[ends[len(tree.edges) :]] + assembled @ assembled)
         total = squares_of_factor + _ASSEMBLY_OPERATIONS * b * 2 * coupled
@@ -249,13 +245,52 @@ def _random_signs(rng: np.random.Generator, shape: tuple[int, ...]) -> FloatArra
 
 
 @compiled
-def _parents(start: IntArray, rows: IntArray) -> IntArray:
+def _parents(start: IntArray, rows: Int32Array) -> IntArray:
     """First row below the diagonal of each column; -1 where there is none."""
     parent = np.full(len(start) - 1, -1)
     for j in range(len(parent)):
-        if start[j] < start[j + 1]:
-            parent[j] = rows[start[j]]
+        for p in range(start[j], start[j + 1]):
+            if parent[j] < 0 or rows[p] < parent[j]:
+                parent[j] = rows[p]
     return parent
+
+
+@compiled
+def _permuted(start: IntArray, rows: Int32Array, order: IntArray) -> tuple[IntArray, Int32Array]:
+    """Columns in another order, one in which rows still stand below the diagonal; rows ascending."""
+    n = len(order)
+    place, new_start, new_rows = np.empty(n, np.int64), np.zeros(n + 1, np.int64), np.empty_like(rows)
+    for j in range(n):
+        place[order[j]] = j
+        new_start[j + 1] = new_start[j] + start[order[j] + 1] - start[order[j]]
+    row_start = np.zeros(n + 1, np.int64)
+    for row in rows:
+        row_start[place[row] + 1] += 1
+    for j in range(n):
+        row_start[j + 1] += row_start[j]
+    columns, cursor = np.empty_like(rows), row_start[:-1].copy()
+    for j in range(n):  # the columns of each row, ascending
+        for p in range(start[order[j]], start[order[j] + 1]):
+            row = place[rows[p]]
+            columns[cursor[row]] = j
+            cursor[row] += 1
+    cursor[:] = new_start[:-1]
+    for row in range(n):  # the rows of each column, ascending
+        for p in range(row_start[row], row_start[row + 1]):
+            new_rows[cursor[columns[p]]] = row
+            cursor[columns[p]] += 1
+    return new_start, new_rows
+
+
+@compiled
+def _row_sums(start: IntArray, rows: Int32Array, weights: FloatArray) -> tuple[IntArray, FloatArray]:
+    """How many columns have a block in each row, and the sum of their weights."""
+    count, total = np.zeros(len(weights), np.int64), np.zeros(len(weights))
+    for j in range(len(weights)):
+        for p in range(start[j], start[j + 1]):
+            count[rows[p]] += 1
+            total[rows[p]] += weights[j]
+    return count, total
 
 
 @compiled

@@ -29,7 +29,7 @@ from topobelief.linalg.extensions import Extensions
 from topobelief.linalg.increment_kernels import add_diagonal_increments, add_increments
 from topobelief.linalg.log_det import UNIT_ROUNDOFF
 
-_PATH_NUMBERS = 16_000_000  # numbers that the paths of one group of extensions may take: 128 MB
+_PATH_NUMBERS = 8_000_000  # numbers a variable of a node that the paths of one group of extensions may take: 64 MB
 _PARTS_PER_THREAD = 4
 _OPERATIONS = 32  # roundings behind one term of R
 _may_overflow = np.errstate(over="ignore", invalid="ignore")  # what is not finite is refused
@@ -85,14 +85,18 @@ def log_det_increments(
     out = np.zeros((extensions.num_extensions, 6))
     rows_i, rows_j = np.ascontiguousarray(form.rows_i), np.ascontiguousarray(form.rows_j)
     path_of = np.full(extensions.num_existing, -1)
-    for which in [np.arange(extensions.num_extensions)] if factor is None else _groups(factor, extensions):
+
+    def add_group(which: IntArray) -> None:
         paths = _no_paths(form.block_size) if factor is None else _paths(factor, extensions, which, path_of)
 
-        def add(first: int, last: int, which: IntArray = which, paths: Paths = paths) -> None:
+        def add(first: int, last: int) -> None:
             add_increments(extensions, rows_i, rows_j, shift, path_of, paths, split, which[first:last], out)
 
         parts = min(len(which), _PARTS_PER_THREAD * num_threads())
         in_parallel(add, np.linspace(0, len(which), parts + 1).astype(int).tolist())
+
+    for which in [np.arange(extensions.num_extensions)] if factor is None else _groups(factor, extensions):
+        add_group(which)
     forest, closures, held, first_rows, other_rows, size = np.ascontiguousarray(out.T)
     error = UNIT_ROUNDOFF * (_OPERATIONS * size + np.abs(forest) + np.abs(closures)) + form.root_error
     return Increments(forest, closures, held, first_rows, other_rows, error, split)
@@ -149,8 +153,8 @@ def _groups(factor: FormFactor, extensions: Extensions) -> list[IntArray]:
     counts = np.concatenate([[0], np.cumsum(place >= 0)])
     first, last = 2 * extensions.edge_start[:-1], 2 * extensions.edge_start[1:]
     which = np.argsort((sums[last] - sums[first]) / np.maximum(counts[last] - counts[first], 1), kind="stable")
-    sizes = tree.path_sizes(np.arange(tree.num_free), factor.block_size)
-    return np.split(which, _cuts(extensions.edges, extensions.edge_start, tree.position, which, sizes, _PATH_NUMBERS))
+    b, sizes = factor.block_size, tree.path_sizes(np.arange(tree.num_free), factor.block_size)
+    return np.split(which, _cuts(extensions.edges, extensions.edge_start, tree.position, which, sizes, b * _PATH_NUMBERS))
 
 
 @compiled
