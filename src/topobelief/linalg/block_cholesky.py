@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from topobelief.arrays import BoolArray, FloatArray, IntArray
-from topobelief.linalg.compiled import compiled
+from topobelief.linalg.compiled import compiled, unset
 
 Int32Array = NDArray[np.int32]  # a large factor has many rows
 
@@ -61,7 +61,13 @@ def assemble(
         if i < 0 or j < 0:
             continue
         low, high = min(i, j), max(i, j)
-        p = start[low] + np.searchsorted(rows[start[low] : start[low + 1]], high)
+        p, end = start[low], start[low + 1]
+        while end - p > 1:
+            middle = (p + end) // 2
+            if rows[middle] <= high:
+                p = middle
+            else:
+                end = middle
         for r in range(num_rows):
             for c in range(b):
                 for d in range(b):
@@ -142,11 +148,11 @@ def factorize(axes: tuple[int, ...], start: IntArray, rows: Int32Array, diagonal
     Columns that follow each other with the same rows (a supernode) wait together for the row at which they are needed next.
     """
     b, n = len(axes), len(diagonal)
-    last = np.arange(n)  # last column of a supernode, by its first one
-    for j in range(n - 2, -1, -1):
-        if start[j] < start[j + 1] and rows[start[j]] == j + 1 and start[j + 1] - start[j] == start[j + 2] - start[j + 1] + 1:
-            last[j] = last[j + 1]
-    head, link = np.full(n, -1), np.full(n, -1)  # supernodes that wait for a row, by their first columns
+    last = np.empty(n, np.int64)  # last column of each one's supernode
+    for j in range(n - 1, -1, -1):
+        count, behind = start[j + 1] - start[j], start[j + 2] - start[j + 1] if j + 1 < n else -1
+        last[j] = last[j + 1] if 0 < count == behind + 1 and rows[start[j]] == j + 1 else j
+    head, link = unset(n), unset(n)  # supernodes that wait for a row, by their first columns
     left = np.zeros(n, np.int64)  # how many rows of a supernode are still to come
     work = np.zeros((n, b, b))
     first = 0

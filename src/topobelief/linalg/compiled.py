@@ -13,6 +13,9 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar, cast
 
 import numba
+import numpy as np
+
+from topobelief.arrays import IntArray
 
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
@@ -24,8 +27,23 @@ def compiled(kernel: Kernel) -> Kernel:
 
     A tuple argument of b integers makes b known to the compiler: loops over its length are unrolled.
     """
-    options = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": {"reassoc", "contract"}}
+    options = {
+        "cache": True,
+        "nogil": True,
+        "no_cfunc_wrapper": True,
+        "error_model": "numpy",
+        "fastmath": {"reassoc", "contract"},
+    }
     return cast(Kernel, _NUMBA.njit(**options)(kernel))
+
+
+@compiled
+def unset(count: int) -> IntArray:
+    """As many indices, all -1. (numba takes seconds to compile `np.full`, `np.arange` and `np.searchsorted`.)"""
+    indices = np.empty(count, np.int64)
+    for n in range(count):
+        indices[n] = -1
+    return indices
 
 
 def num_threads() -> int:

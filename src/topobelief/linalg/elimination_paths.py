@@ -22,7 +22,7 @@ import qdldl
 from topobelief.arrays import BoolArray, FloatArray, IntArray
 from topobelief.linalg.block_cholesky import Int32Array, assemble, factorize, inverse_columns, pull, solve
 from topobelief.linalg.block_pattern import BlockPattern
-from topobelief.linalg.compiled import compiled, in_parallel, num_threads
+from topobelief.linalg.compiled import compiled, in_parallel, num_threads, unset
 from topobelief.linalg.edge_form import EdgeForm, laplacian_form
 from topobelief.linalg.log_det import UNIT_ROUNDOFF, LogDet
 
@@ -247,7 +247,7 @@ def _random_signs(rng: np.random.Generator, shape: tuple[int, ...]) -> FloatArra
 @compiled
 def _parents(start: IntArray, rows: Int32Array) -> IntArray:
     """First row below the diagonal of each column; -1 where there is none."""
-    parent = np.full(len(start) - 1, -1)
+    parent = unset(len(start) - 1)
     for j in range(len(parent)):
         for p in range(start[j], start[j + 1]):
             if parent[j] < 0 or rows[p] < parent[j]:
@@ -259,7 +259,7 @@ def _parents(start: IntArray, rows: Int32Array) -> IntArray:
 def _permuted(start: IntArray, rows: Int32Array, order: IntArray) -> tuple[IntArray, Int32Array]:
     """Columns in another order, one in which rows still stand below the diagonal; rows ascending."""
     n = len(order)
-    place, new_start, new_rows = np.empty(n, np.int64), np.zeros(n + 1, np.int64), np.empty_like(rows)
+    place, new_start, new_rows = np.empty(n, np.int64), np.zeros(n + 1, np.int64), np.empty(len(rows), np.int32)
     for j in range(n):
         place[order[j]] = j
         new_start[j + 1] = new_start[j] + start[order[j] + 1] - start[order[j]]
@@ -268,13 +268,13 @@ def _permuted(start: IntArray, rows: Int32Array, order: IntArray) -> tuple[IntAr
         row_start[place[row] + 1] += 1
     for j in range(n):
         row_start[j + 1] += row_start[j]
-    columns, cursor = np.empty_like(rows), row_start[:-1].copy()
+    columns, cursor = np.empty(len(rows), np.int32), row_start[:-1].copy()
     for j in range(n):  # the columns of each row, ascending
         for p in range(start[order[j]], start[order[j] + 1]):
             row = place[rows[p]]
             columns[cursor[row]] = j
             cursor[row] += 1
-    cursor[:] = new_start[:-1]
+    cursor = new_start[:-1].copy()
     for row in range(n):  # the rows of each column, ascending
         for p in range(row_start[row], row_start[row + 1]):
             new_rows[cursor[columns[p]]] = row
@@ -297,7 +297,7 @@ def _row_sums(start: IntArray, rows: Int32Array, weights: FloatArray) -> tuple[I
 def _postorder(parent: IntArray) -> IntArray:
     """An order in which every subtree is contiguous and children stand before their parents; the identity if that is one."""
     n = len(parent)
-    child, sibling = np.full(n + 1, -1), np.full(n + 1, -1)
+    child, sibling = unset(n + 1), unset(n + 1)
     for j in range(n - 1, -1, -1):  # children in ascending order; roots hang on node n
         above = parent[j] if parent[j] >= 0 else n
         sibling[j], child[above] = child[above], j

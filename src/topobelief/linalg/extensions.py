@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from topobelief.arrays import BoolArray, IntArray
-from topobelief.linalg.compiled import compiled
+from topobelief.linalg.compiled import compiled, unset
 
 
 class Extensions(NamedTuple):
@@ -84,10 +84,12 @@ def _plant_forests(
 ) -> None:
     """Kruskal's algorithm on each extension, all existing nodes taken as one; then a walk from there."""
     for k in range(len(node_start) - 1):
-        first_new, num_new = node_start[k], node_start[k + 1] - node_start[k]
+        first_new, num_new = node_start[k], int(node_start[k + 1] - node_start[k])
         offset = num_existing + first_new - 1  # new nodes are 1, 2, …; all existing ones together are 0
-        group = np.arange(num_new + 1, dtype=np.int64)
-        head, link = np.full(num_new + 1, -1), np.full((edge_start[k + 1] - edge_start[k], 2), -1)  # stems at each node
+        group, head = np.empty(num_new + 1, np.int64), unset(num_new + 1)
+        for node in range(num_new + 1):
+            group[node] = node
+        link = np.empty((edge_start[k + 1] - edge_start[k], 2), np.int64)  # stems at each node, from its `head` on
         for sweep in range(2):
             for e in range(edge_start[k], edge_start[k + 1]):
                 i, j = max(int(edges[e, 0]) - offset, 0), max(int(edges[e, 1]) - offset, 0)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from topobelief.arrays import BoolArray, FloatArray, IntArray
-from topobelief.linalg.compiled import compiled
+from topobelief.linalg.compiled import compiled, unset
 from topobelief.linalg.dense_kernels import copy_block, triangularise
 from topobelief.linalg.extensions import Extensions
 
@@ -61,7 +61,10 @@ class Forest(NamedTuple):
 @compiled
 def new_blocks(capacity: int, b: int) -> Blocks:
     """Room for blocks."""
-    return Blocks(np.full((capacity, 2), -1), np.zeros((capacity, 2, b, b)))
+    ends = np.empty((capacity, 2), np.int64)
+    for q in range(capacity):
+        ends[q, 0] = ends[q, 1] = -1
+    return Blocks(ends, np.zeros((capacity, 2, b, b)))
 
 
 @compiled
@@ -74,7 +77,7 @@ def new_forest(num_new: int, b: int, shift: float) -> Forest:
             for c in range(b):
                 unary[new, c, c] = math.sqrt(shift)
     shape = (num_new, b, b)
-    return Forest(np.empty(num_new, np.int64), np.empty(shape), np.empty(shape), unary, has_unary, np.full(num_new, -1))
+    return Forest(np.empty(num_new, np.int64), np.empty(shape), np.empty(shape), unary, has_unary, unset(num_new))
 
 
 @compiled

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from topobelief.arrays import FloatArray, IntArray
-from topobelief.linalg.compiled import compiled
+from topobelief.linalg.compiled import compiled, unset
 from topobelief.linalg.dense_kernels import cholesky_log_det, gram_block, periodic_part
 from topobelief.linalg.elimination_paths import Paths
 from topobelief.linalg.extensions import Extensions
@@ -187,7 +187,7 @@ def add_diagonal_increments(
     """
     r, b = rows_i.shape[1], rows_i.shape[2]
     n = extensions.num_existing
-    slot_of = np.full(n, -1)
+    slot_of = unset(n)
     before, after = np.empty((b, b)), np.empty((b, b))
     for k in range(len(out)):
         first_new, num_new = extensions.node_start[k], extensions.node_start[k + 1] - extensions.node_start[k]

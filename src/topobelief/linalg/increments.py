@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from topobelief.arrays import FloatArray, IntArray
-from topobelief.linalg.compiled import compiled, in_parallel, num_threads
+from topobelief.linalg.compiled import compiled, in_parallel, num_threads, unset
 from topobelief.linalg.edge_form import EdgeForm
 from topobelief.linalg.elimination_paths import FormFactor, Paths
 from topobelief.linalg.extensions import Extensions
@@ -166,14 +166,19 @@ def _touched(edges: IntArray, edge_start: IntArray, position: IntArray, which: I
             for side in range(2):
                 if edges[e, side] < len(position) and position[edges[e, side]] >= 0:
                     marked[position[edges[e, side]]] = True
-    return np.flatnonzero(marked)
+    places, count = np.empty(len(position), np.int64), 0
+    for place in range(len(position)):
+        if marked[place]:
+            places[count] = place
+            count += 1
+    return places[:count].copy()
 
 
 @compiled
 def _cuts(edges: IntArray, edge_start: IntArray, position: IntArray, which: IntArray, sizes: IntArray, limit: int) -> IntArray:
     """Where to cut a list of extensions so that the paths of each piece take no more than `limit` numbers."""
     cuts, piece, total = np.empty(len(which), np.int64), 0, 0
-    seen = np.full(len(position), -1)  # the last piece that touches a node
+    seen = unset(len(position))  # the last piece that touches a node
     for n in range(len(which)):
         added = 0
         for _ in range(2):

@@ -13,7 +13,9 @@ from scipy import sparse
 
 from topobelief.arrays import FloatArray, IntArray
 from topobelief.graph.topology import Topology
-from topobelief.linalg.compiled import compiled
+from topobelief.linalg.compiled import compiled, in_parallel, num_threads, unset
+
+_EDGES_PER_THREAD = 10_000  # fewer are done before a thread has started
 
 
 class DegreeEntropy:
@@ -26,9 +28,9 @@ class DegreeEntropy:
     """
 
     def __init__(self, topology: Topology) -> None:
-        simple = topology.simple()
-        i, j = simple.edges.T
         n = topology.num_nodes
+        low, high = np.sort(topology.edges, axis=1).T
+        i, j = np.divmod(np.unique(low * n + high), n)
         adjacency = sparse.csr_array((np.ones(2 * len(i)), (np.r_[i, j], np.r_[j, i])), shape=(n, n))
         adjacency.sort_indices()
         self._num_nodes = n
@@ -47,7 +49,13 @@ class DegreeEntropy:
         num_new : shape (K,)
         """
         changes = np.empty(len(num_new))
-        _changes(self._start, self._neighbours, edges, edge_start, num_new, changes)
+
+        def work(first: int, last: int) -> None:
+            part = slice(first, last)
+            _changes(self._start, self._neighbours, edges, edge_start[first : last + 1], num_new[part], changes[part])
+
+        parts = min(num_threads(), 1 + len(edges) // _EDGES_PER_THREAD)
+        in_parallel(work, np.linspace(0, len(num_new), parts + 1).astype(int).tolist())
         return (self._num_nodes + num_new) / 2 * math.log(2) - 0.5 * (self._sum + changes)
 
 
@@ -60,50 +68,56 @@ def _changes(
     for k in range(len(num_new)):
         longest, most = max(longest, edge_start[k + 1] - edge_start[k]), max(most, num_new[k])
     gain = np.zeros(n + most, np.int64)  # new edges at each node
-    head, link = np.full(n + most, -1), np.empty(longest, np.int64)  # new edges by the larger of their ends
-    kept = np.empty(longest, np.int64)
+    head, link = unset(n + most), np.empty(longest, np.int64)  # new edges by the larger of their ends
+    low, high = np.empty(longest, np.int64), np.empty(longest, np.int64)
     for k in range(len(num_new)):
         count = 0
         for e in range(edge_start[k], edge_start[k + 1]):
-            low, high = min(edges[e, 0], edges[e, 1]), max(edges[e, 0], edges[e, 1])
+            i, j = min(edges[e, 0], edges[e, 1]), max(edges[e, 0], edges[e, 1])
             known = False
-            if high < n:
-                p, end = int(start[low]), int(start[low + 1])
-                while p < end and neighbours[p] < high:
+            if j < n:
+                p, end = int(start[i]), int(start[i + 1])
+                while p < end and neighbours[p] < j:
                     p += 1
-                known = p < end and bool(neighbours[p] == high)
-            at = head[high]
+                known = p < end and bool(neighbours[p] == j)
+            at = head[j]
             while at >= 0 and not known:
-                known = bool(min(edges[kept[at], 0], edges[kept[at], 1]) == low)
+                known = bool(low[at] == i)
                 at = link[at]
-            if known:
-                continue
-            kept[count], link[count], head[high] = e, head[high], count
-            count += 1
-            gain[low] += 1
-            gain[high] += 1
+            if not known:
+                low[count], high[count], link[count], head[j] = i, j, head[j], count
+                gain[i] += 1
+                gain[j] += 1
+                count += 1
         total = 0.0
+        for at in range(count):  # new edges; and old ones at nodes that gain some, from the end that comes first: head -2
+            d = gain[high[at]]
+            if high[at] < n:
+                d += start[high[at] + 1] - start[high[at]]
+                total += _old_edges(start, neighbours, gain, head, high[at])
+            if low[at] < n:
+                total += _old_edges(start, neighbours, gain, head, low[at])
+                total += 1.0 / (d * (gain[low[at]] + start[low[at] + 1] - start[low[at]]))
+            else:
+                total += 1.0 / (d * gain[low[at]])
         for at in range(count):
-            i, j = edges[kept[at], 0], edges[kept[at], 1]
-            d_i = gain[i] + (start[i + 1] - start[i] if i < n else 0)
-            d_j = gain[j] + (start[j + 1] - start[j] if j < n else 0)
-            total += 1.0 / (d_i * d_j)
-        for at in range(count):  # old edges at nodes that gain some, once: `head` >= -1 marks what is still to do
-            for side in range(2):
-                t = edges[kept[at], side]
-                if t >= n or head[t] == -2:
-                    continue
-                head[t] = -2
-                before = start[t + 1] - start[t]
-                after = before + gain[t]
-                for p in range(start[t], start[t + 1]):
-                    s = neighbours[p]
-                    if head[s] == -2:  # done from the other end
-                        continue
-                    d = start[s + 1] - start[s]
-                    total += 1.0 / (after * (d + gain[s])) - 1.0 / (before * d)
-        for at in range(count):
-            for side in range(2):
-                head[edges[kept[at], side]] = -1
-                gain[edges[kept[at], side]] = 0
+            head[low[at]] = head[high[at]] = -1
+            gain[low[at]] = gain[high[at]] = 0
         changes[k] = total
+
+
+@compiled
+def _old_edges(start: IntArray, neighbours: IntArray, gain: IntArray, done: IntArray, t: int) -> float:
+    """What the graph's own edges at node t add to S by the new degrees, but for those to nodes that are done (-2)."""
+    total = 0.0
+    if done[t] == -2:
+        return total
+    done[t] = -2
+    before = start[t + 1] - start[t]
+    after = before + gain[t]
+    for p in range(start[t], start[t + 1]):
+        s = neighbours[p]
+        if done[s] != -2:
+            d = start[s + 1] - start[s]
+            total += 1.0 / (after * (d + gain[s])) - 1.0 / (before * d)
+    return total
