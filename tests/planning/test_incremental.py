@@ -5,12 +5,14 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from data_files import data_file
 from graphs import SE2_GROUP, SE3_GROUP, Noise, random_action, random_pose_graph, sessions, shares_isotropic_noise
 from references import LOG_2_PI_E, log_det_exact
 from topobelief.errors import IllConditionedError, InvalidGraphError
 from topobelief.graph.action import Action, posterior
 from topobelief.graph.fisher import fisher_rows
 from topobelief.graph.pose_graph import PoseGraph
+from topobelief.io.g2o import read_g2o
 from topobelief.planning import incremental, posterior_forms
 from topobelief.planning.action_batch import ActionBatch
 from topobelief.planning.evaluation import ScratchEvaluation
@@ -285,6 +287,47 @@ def test_an_action_that_closes_too_many_loops_for_a_dense_matrix_is_evaluated_fr
     np.testing.assert_allclose(found.signatures(actions)[0], signatures, rtol=1e-12)
     np.testing.assert_allclose(found.bounds(actions), [lower, upper], rtol=1e-10)
     np.testing.assert_allclose(found.entropies(actions)[0], entropies, rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["csail.g2o", "intel.g2o", "parking-garage.g2o"])
+def test_real_graphs(name):
+    """One edge of intel.g2o carries information 2.7e12; there the evaluation from scratch is the less accurate."""
+    graph = read_g2o(data_file(name))
+    rng = np.random.default_rng(2)
+    n, k = graph.num_poses, graph.group.position_dim
+    actions = []
+    for start in (n - 1, n - 1, 100):
+        poses = np.tile(graph.poses[start], (20, 1))
+        poses[:, :k] += np.cumsum(rng.normal(size=(20, k)), axis=0)
+        edges = [
+            (start, n),
+            *((n + i, n + i + 1) for i in range(19)),
+            *((n + int(rng.integers(20)), int(rng.integers(n))) for _ in range(8)),
+        ]
+        actions.append(Action(poses, edges, graph.information[rng.integers(graph.num_edges, size=len(edges))]))
+    signatures, lower, upper, entropies, errors = from_scratch(graph, actions)
+    found = evaluation(graph)
+    np.testing.assert_allclose(found.signatures(actions)[0], signatures, rtol=1e-9)
+    values, found_errors = found.entropies(actions)
+    assert (np.abs(values - entropies) <= 1e-9 * np.abs(entropies) + errors * (name == "intel.g2o")).all()
+    assert (found_errors < 0.01).all()
+    np.testing.assert_allclose(found.bounds(actions), [lower, upper], rtol=1e-9, atol=4 * errors.max())
+    low, high = evaluation(graph, family="anchored").bounds(actions)
+    assert (low <= values + found_errors).all()
+    assert (values - found_errors <= high).all()
+    assert (high - low < upper - lower).all()
+
+
+@pytest.mark.parametrize("scale", [1e100, 1e200])
+@pytest.mark.parametrize("family", ["fischer", "paper", "anchored"])
+def test_numbers_that_overflow_are_refused_without_a_warning(scale, family):
+    poses = PRIOR.poses * [scale, scale, 1.0]
+    prior = PoseGraph(poses, PRIOR.edges, None, np.diag([1e300, 1e300, 1.0]))
+    action = Action([[scale, 0, 0]], [(4, 5), (5, 1)], prior.information[0])
+    found = evaluation(prior, family=family)
+    for quantity in (found.bounds, found.entropies):
+        with pytest.raises(IllConditionedError):
+            quantity([action])
 
 
 def test_a_prior_that_double_precision_cannot_factor_is_refused():

@@ -104,6 +104,23 @@ def cholesky_log_det(matrix: FloatArray) -> float:
 
 
 @compiled
+def inverse_diagonal(factor: FloatArray) -> FloatArray:
+    """Diagonal of (C C^T)^-1, C the lower triangle."""
+    inverse, diagonal = np.zeros(factor.shape), np.zeros(len(factor))
+    for i in range(len(factor)):
+        row, scale = inverse[i], 1.0 / factor[i, i]
+        for j in range(i):
+            value, other = factor[i, j], inverse[j]
+            for m in range(j + 1):
+                row[m] -= value * other[m]
+        row[i] = 1.0
+        for m in range(i + 1):
+            row[m] *= scale
+            diagonal[m] += row[m] * row[m]
+    return diagonal
+
+
+@compiled
 def periodic_part(matrix: FloatArray, period: int, offset: int, count: int) -> FloatArray:
     """Lower triangle of the rows and columns offset, …, offset + count - 1 of each period."""
     size = len(matrix) // period * count

@@ -18,12 +18,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import qdldl
+from scipy import sparse
 
 from topobelief.arrays import BoolArray, FloatArray, IntArray
 from topobelief.linalg.block_cholesky import Int32Array, assemble, factorize, inverse_columns, pull, solve
-from topobelief.linalg.block_pattern import BlockPattern
 from topobelief.linalg.compiled import compiled, in_parallel, num_threads, unset
-from topobelief.linalg.edge_form import EdgeForm, laplacian_form
+from topobelief.linalg.edge_form import EdgeForm
 from topobelief.linalg.log_det import UNIT_ROUNDOFF, LogDet
 
 _QDLDL: Any = qdldl  # ships no types
@@ -73,9 +73,7 @@ class EliminationTree:
         if len(free) == 0:
             none = np.zeros(0, np.int64)
             return EliminationTree(edges, position, none, np.zeros(1, np.int64), none.astype(np.int32), none, none)
-        pattern = BlockPattern.build(edges, np.arange(num_nodes) != held, 1)
-        any_form = pattern.upper(laplacian_form(edges, np.ones(len(edges))), shift=1.0)
-        lower, _, order = _QDLDL.Solver(any_form, upper=True).factors()
+        lower, _, order = _QDLDL.Solver(_any_upper(edges, num_nodes, free), upper=True).factors()
         start, rows = lower.indptr.astype(np.int64), lower.indices.astype(np.int32)
         postorder = _postorder(_parents(start, rows))
         start, rows = _permuted(start, rows, postorder)
@@ -242,6 +240,20 @@ class FormFactor:
 
 def _random_signs(rng: np.random.Generator, shape: tuple[int, ...]) -> FloatArray:
     return np.where(rng.integers(2, size=shape, dtype=np.int8), 1.0, -1.0)
+
+
+def _any_upper(edges: IntArray, num_nodes: int, free: IntArray) -> sparse.csc_array:
+    """Upper triangle of a well-conditioned matrix with the graph's pattern on the free nodes: a Laplacian plus I."""
+    position = np.full(num_nodes, -1)
+    position[free] = np.arange(len(free))
+    low, high = np.sort(position[edges], axis=1).T
+    pairs = np.unique(high[low >= 0] * len(free) + low[low >= 0])
+    column, row = np.divmod(pairs, len(free))
+    degrees = np.bincount(row, minlength=len(free)) + np.bincount(column, minlength=len(free))
+    rows = np.concatenate([row, np.arange(len(free))])
+    columns = np.concatenate([column, np.arange(len(free))])
+    values = np.concatenate([np.full(len(pairs), -1.0), degrees + 1.0])
+    return sparse.csc_array((values, (rows, columns)), shape=(len(free), len(free)))
 
 
 @compiled

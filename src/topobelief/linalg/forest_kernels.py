@@ -95,15 +95,14 @@ def leave_rest(
             for c in range(b):
                 blocks.rows[count, 0, r - first, c] = work[r, b + c]
         return count + 1
-    stack = np.empty((b + last - first, b))
-    copy_block(forest.unary[new], stack, 0, 0)
     for r in range(first, last):
-        for c in range(b):
-            stack[b + r - first, c] = work[r, b + c]
-    triangularise(stack, len(stack), b, b)
-    for r in range(b):
-        for c in range(b):
-            forest.unary[new, r, c] = stack[r, c]
+        for c in range(b):  # Givens rotations of the row into the triangle
+            size = math.hypot(forest.unary[new, c, c], work[r, b + c])
+            if size > 0.0:
+                cosine, sine = forest.unary[new, c, c] / size, work[r, b + c] / size
+                for d in range(c, b):
+                    old, added = forest.unary[new, c, d], work[r, b + d]
+                    forest.unary[new, c, d], work[r, b + d] = cosine * old + sine * added, cosine * added - sine * old
     forest.has_unary[new] = True
     return count
 

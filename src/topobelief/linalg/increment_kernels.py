@@ -8,7 +8,7 @@ import numpy as np
 
 from topobelief.arrays import FloatArray, IntArray
 from topobelief.linalg.compiled import compiled, unset
-from topobelief.linalg.dense_kernels import cholesky_log_det, gram_block, periodic_part
+from topobelief.linalg.dense_kernels import cholesky_log_det, gram_block, inverse_diagonal, periodic_part
 from topobelief.linalg.elimination_paths import Paths
 from topobelief.linalg.extensions import Extensions
 from topobelief.linalg.forest_kernels import (
@@ -76,20 +76,24 @@ def add_increments(
             matrix[p, p] += 1.0
             out[k, 5] += matrix[p, p]
         out[k, 2] = cholesky_log_det(matrix.copy())
-        out[k, 5] += add_existing(blocks, count, path_of, paths, matrix)
+        sizes = add_existing(blocks, count, path_of, paths, matrix)
         if split:
             out[k, 3] = cholesky_log_det(periodic_part(matrix, b, 0, split))
             out[k, 4] = cholesky_log_det(periodic_part(matrix, b, split, b - split))
         out[k, 1] = cholesky_log_det(matrix)
+        variances = inverse_diagonal(matrix)
+        for p in range(count * b):
+            out[k, 5] += variances[p] * sizes[p]
 
 
 @compiled
-def add_existing(blocks: Blocks, count: int, path_of: IntArray, paths: Paths, matrix: FloatArray) -> float:
+def add_existing(blocks: Blocks, count: int, path_of: IntArray, paths: Paths, matrix: FloatArray) -> FloatArray:
     """Add A M^-1 A^T to the lower triangle of the matrix, A the blocks' rows on existing nodes.
 
-    Returns the trace that it would have if no terms cancelled.
+    Returns the diagonal that it would have if no terms cancelled.
     """
     b = blocks.rows.shape[2]
+    sizes = np.zeros(count * b)
     sites, num_sites = np.empty(2 * count, np.int64), 0  # paths, ascending
     for q in range(count):
         for side in range(2):
@@ -105,9 +109,9 @@ def add_existing(blocks: Blocks, count: int, path_of: IntArray, paths: Paths, ma
             sites[at] = path
             num_sites += 1
     if num_sites == 0:
-        return 0.0
+        return sizes
     inverse = inverse_at(sites[:num_sites], paths)
-    product, size = np.zeros((count * b, b * num_sites)), 0.0  # A M^-1
+    product = np.zeros((count * b, b * num_sites))  # A M^-1
     for q in range(count):
         for side in range(2):
             site = 0
@@ -124,7 +128,7 @@ def add_existing(blocks: Blocks, count: int, path_of: IntArray, paths: Paths, ma
                     spread += abs(factor) * math.sqrt(other[at + d])
                     for m in range(b * num_sites):
                         row[m] += factor * other[m]
-            size += spread * spread
+            sizes[q * b + c] = spread * spread
     for p in range(count * b):
         row, target = product[p], matrix[p]
         for q in range(p // b + 1):
@@ -133,7 +137,7 @@ def add_existing(blocks: Blocks, count: int, path_of: IntArray, paths: Paths, ma
                 for c in range(b if at >= 0 else 0):
                     for d in range(b):
                         target[q * b + c] += row[at + d] * blocks.rows[q, side, c, d]
-    return size
+    return sizes
 
 
 @compiled

@@ -10,9 +10,9 @@ increments, never differences of two large numbers; entries of M^-1 come from pa
 nodes held, ln det T + ln det (I + V V^T) is left, the block of the new nodes. Edges with more rows than variables are brought
 to square rows; what is left over stands on a new node alone where there is one, and costs nothing.
 
-Errors, beyond those of M (see `elimination_paths`): R is computed from rows that are known to a few roundings each, and
-I + R >= I, so that ln det (I + R) is off by a few units of roundoff times the trace of I + R, taken as if no terms cancelled;
-ln det T by as many times the condition numbers of the triangles of which it is the product.
+Errors, beyond those of M (see `elimination_paths`), in units of roundoff times the roundings behind a number: R is off by E
+with |E_pq| <= sqrt(S_p S_q), S the diagonal that R would have if no terms cancelled, and ln det (I + R) by tr((I + R)^-1 E),
+about the sum of ((I + R)^-1)_pp S_p; ln det T by the condition numbers of the triangles whose product it is.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ import numpy as np
 from topobelief.arrays import FloatArray, IntArray
 from topobelief.graph.action import Action
 from topobelief.graph.fisher import FisherRows, fisher_rows
-from topobelief.graph.information import scalar_weights
+from topobelief.graph.information import isotropic_weights, scalar_weights
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.graph.topology import Topology
 from topobelief.linalg.extensions import Extensions
@@ -80,11 +80,15 @@ class ActionBatch:
 
     @cached_property
     def information(self) -> FloatArray:
-        """Information matrices of all edges, (number of edges, kappa, kappa)."""
-        kappa = self.graph.tangent_dim  # an action without edges need not know it
-        return np.concatenate(
-            [np.zeros((0, kappa, kappa)), *(action.information for action in self.actions if len(action.edges))]
-        )
+        """Information matrices of all edges, (number of edges, kappa, kappa); one that all share takes the place of one."""
+        kappa = self.graph.tangent_dim
+        matrices = [action.information for action in self.actions if len(action.edges)]
+        if not matrices:
+            return np.zeros((0, kappa, kappa))  # actions without edges need not know kappa
+        firsts = np.stack([each[0] for each in matrices])
+        if all(each.strides[0] == 0 for each in matrices) and (firsts == firsts[0]).all():
+            return np.broadcast_to(firsts[0], (int(self.num_edges.sum()), kappa, kappa))
+        return np.concatenate(matrices)
 
     @cached_property
     def rows(self) -> FisherRows:
@@ -99,7 +103,7 @@ class ActionBatch:
     @cached_property
     def scalar_weights(self) -> tuple[FloatArray, FloatArray]:
         """(w_p, w_r) of all edges."""
-        return scalar_weights_of(self.rows.weights, self.information)
+        return scalar_weights_of(self.information)
 
     def sums(self, values: FloatArray) -> FloatArray:
         """Sum over each action's edges, shape (K,)."""
@@ -107,13 +111,9 @@ class ActionBatch:
         return total[self.edge_start[1:]] - total[self.edge_start[:-1]]
 
 
-def scalar_weights_of(
-    isotropic: tuple[FloatArray, FloatArray] | None, information: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """(w_p, w_r) of edges, as spanning-tree signatures take them; computed once where all edges share one matrix."""
-    if isotropic is not None:
-        return isotropic
-    if len(information) and (information == information[0]).all():
-        w_p, w_r = scalar_weights(information[:1])
-        return np.repeat(w_p, len(information)), np.repeat(w_r, len(information))
-    return scalar_weights(information)
+def scalar_weights_of(information: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(w_p, w_r) of edges, as spanning-tree signatures take them; block-isotropic noise has its own."""
+    if len(information) > 1 and (information.strides[0] == 0 or (information == information[0]).all()):
+        w_p, w_r = scalar_weights_of(information[:1])
+        return np.broadcast_to(w_p, len(information)), np.broadcast_to(w_r, len(information))
+    return isotropic_weights(information) or scalar_weights(information)

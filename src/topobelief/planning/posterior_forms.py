@@ -110,20 +110,25 @@ class PriorForms:
         self._trees: dict[int, EliminationTree] = {}
         self._factors: dict[tuple[FormName, float], FormFactor] = {}
 
+    @property
+    def edges(self) -> IntArray:
+        """The prior's edges, shape (m, 2)."""
+        return self.graph.edges
+
     @cached_property
     def rows(self) -> FisherRows:
         """Whitened rows of the prior's edges."""
         return fisher_rows(self.graph)
 
     @cached_property
-    def weights(self) -> tuple[FloatArray, FloatArray]:
+    def scalar_weights(self) -> tuple[FloatArray, FloatArray]:
         """(w_p, w_r) of the prior's edges."""
-        return scalar_weights_of(self.rows.weights, self.graph.information)
+        return scalar_weights_of(self.graph.information)
 
     @cached_property
     def lever_sums(self) -> FloatArray:
         """Sum of w_p |d|^2 over the edges that leave each pose, shape (n,)."""
-        weights = self.weights[0] * self.rows.squared_lengths()
+        weights = self.scalar_weights[0] * self.rows.squared_lengths()
         return np.bincount(self.graph.edges[:, 0], weights=weights, minlength=self.graph.num_poses).astype(np.float64)
 
     def factor(self, name: FormName, shift: float) -> FormFactor:
@@ -132,7 +137,7 @@ class PriorForms:
         Where it does not matter which pose is held but rounding does, the one with the strongest rows is, if that is better.
         """
         if (name, shift) not in self._factors:
-            form = self.form(name)
+            form = form_of(name, self)
             factor = FormFactor.of(self._tree(self.anchor), form, shift=shift)
             if not (factor.log_det.error <= _HOLD_STRONGEST_ERROR or name == "rotations" or shift):
                 strongest = FormFactor.of(self._tree(form.strongest_node()), form)
@@ -142,11 +147,7 @@ class PriorForms:
 
     def hadamard(self, name: FormName, shift: float) -> LogDet:
         """Sum of ln det of the diagonal blocks."""
-        return self._diagonal_solver.hadamard(self.form(name), shift=shift)
-
-    def form(self, name: FormName) -> EdgeForm:
-        """A form of the prior's edges."""
-        return form_of(name, self.rows, self.weights)
+        return self._diagonal_solver.hadamard(form_of(name, self), shift=shift)
 
     def _tree(self, held: int) -> EliminationTree:
         if held not in self._trees:
@@ -187,7 +188,7 @@ class PosteriorForms:
         known = self._known.get((name, shift))
         if known is None or (split and known.increments.split != split):
             factor = self.prior.factor(name, shift)
-            increments = log_det_increments(factor, self.batch.extensions, self._form(name), shift=shift, split=split)
+            increments = log_det_increments(factor, self.batch.extensions, form_of(name, self.batch), shift=shift, split=split)
             value, error = factor.log_det.value, 2 * factor.log_det.error
             small = factor.tree.num_free * factor.block_size <= _QR_SIZE
             if not error <= (_QR_RELATIVE_ERROR * max(1.0, abs(value)) if small else _LARGEST_ERROR):
@@ -203,7 +204,7 @@ class PosteriorForms:
         """ln det of the new poses' block of a form, for which the prior need not be factored."""
         if self.knows(name):
             return self.log_dets(name).new
-        increments = log_det_increments(None, self.batch.extensions, self._form(name))
+        increments = log_det_increments(None, self.batch.extensions, form_of(name, self.batch))
         return Estimates(increments.forest + increments.closures_held, increments.error)
 
     def weighted_trees(self, part: Callable[[FormLogDets], Estimates], num_free: IntArray) -> Estimates:
@@ -220,8 +221,8 @@ class PosteriorForms:
         shifts = np.zeros(self.batch.count) if shift is None else shift
         distinct, which = np.unique(shifts, return_inverse=True)
         prior = [self.prior.hadamard(name, float(value)) for value in distinct]
-        form, held = self.prior.form(name), self.prior.anchor
-        increments, errors = diagonal_increments(form, held, self.batch.extensions, self._form(name), shifts)
+        form, held = form_of(name, self.prior), self.prior.anchor
+        increments, errors = diagonal_increments(form, held, self.batch.extensions, form_of(name, self.batch), shifts)
         values = np.array([value.value for value in prior])[which] + increments
         return Estimates(values, np.array([value.error for value in prior])[which] + errors)
 
@@ -243,19 +244,14 @@ class PosteriorForms:
     @cached_property
     def _ratio(self) -> float | None:
         """w_r / w_p where it is the same on all edges of prior and actions, else None."""
-        ratios = np.concatenate([w_r / w_p for w_p, w_r in (self.prior.weights, self.batch.scalar_weights)])
+        ratios = np.concatenate([w_r / w_p for w_p, w_r in (self.prior.scalar_weights, self.batch.scalar_weights)])
         if len(ratios) == 0:
             return 1.0
         return float(ratios[0]) if np.ptp(ratios) <= SAME_NOISE * ratios[0] else None
 
-    def _form(self, name: FormName) -> EdgeForm:
-        return form_of(name, self.batch.rows, self.batch.scalar_weights)
 
-
-def form_of(name: FormName, rows: FisherRows, weights: tuple[FloatArray, FloatArray]) -> EdgeForm:
-    """A form of some edges; `weights` are the scalar ones of the trees."""
-    if name == "trees_p":
-        return laplacian_form(rows.edges, weights[0])
-    if name == "trees_r":
-        return laplacian_form(rows.edges, weights[1])
-    return getattr(replace(rows, weights=None), name)()  # in blocks, whatever the noise
+def form_of(name: FormName, edges: ActionBatch | PriorForms) -> EdgeForm:
+    """A form of the prior's edges or of a batch's; in blocks, whatever the noise. Trees need no rows, which take time."""
+    if name in ("trees_p", "trees_r"):
+        return laplacian_form(edges.edges, edges.scalar_weights[name == "trees_r"])
+    return getattr(replace(edges.rows, weights=None), name)()

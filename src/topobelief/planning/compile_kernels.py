@@ -1,0 +1,47 @@
+"""Compile every kernel before the first decision needs it: `python -m topobelief.planning.compile_kernels`.
+
+Kernels are compiled for the types of argument that they meet, once a machine, and kept on disk (see `linalg.compiled`). A tiny
+decision of each kind meets them all; it takes half a minute, or an instant if it has been done before.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from topobelief.geometry import SE2_GROUP, SE3_GROUP, Group
+from topobelief.graph.action import Action
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.planning.evaluation import SignatureName
+from topobelief.planning.incremental import IncrementalEvaluation
+
+_CHOICES: tuple[tuple[SignatureName, str, str], ...] = (
+    ("spanning_trees", "fischer", "cholesky"),
+    ("spanning_trees", "anchored", "cholesky"),
+    ("von_neumann_approx", "fischer", "hadamard"),
+)
+
+
+def compile_kernels() -> None:
+    """Evaluate an action on a ring of poses, in SE(2) and SE(3), with block-isotropic and other noise."""
+    for group in (SE2_GROUP, SE3_GROUP):
+        for coupling in (0.0, 0.1):
+            graph, action = _ring(group, coupling)
+            for signature, family, determinant in _CHOICES:
+                evaluation = IncrementalEvaluation(graph, "map", signature, False, family, determinant, 0)
+                evaluation.signatures([action])
+                evaluation.bounds([action])
+                evaluation.entropies([action])
+
+
+def _ring(group: Group, coupling: float, *, num_poses: int = 70) -> tuple[PoseGraph, Action]:
+    """Large enough for errors to be sampled; an action that adds a pose and closes a loop."""
+    kappa, pose = group.tangent_dim, np.arange(num_poses)
+    poses = np.tile(group.identity(), (num_poses + 1, 1))
+    poses[:-1, 0], poses[:-1, 1] = np.cos(pose), np.sin(pose)
+    information = np.eye(kappa) + coupling * np.ones((kappa, kappa))
+    graph = PoseGraph(poses[:-1], np.stack([pose, (pose + 1) % num_poses], axis=1), None, information)
+    return graph, Action(poses[-1:], [(0, num_poses), (num_poses, 1)], information)
+
+
+if __name__ == "__main__":
+    compile_kernels()

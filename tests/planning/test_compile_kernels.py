@@ -1,0 +1,50 @@
+"""What is compiled beforehand is all that decisions need."""
+
+import importlib
+import pkgutil
+
+import numpy as np
+
+import topobelief.linalg
+import topobelief.signatures
+from graphs import NOISES, SE2_GROUP, SE3_GROUP, Noise, random_action, random_pose_graph
+from topobelief.planning.compile_kernels import compile_kernels
+from topobelief.planning.incremental import IncrementalEvaluation
+
+
+def compiled_signatures():
+    """Argument types for which each kernel is compiled, by the kernel's name."""
+    found = {}
+    for package in (topobelief.linalg, topobelief.signatures):
+        for module in pkgutil.iter_modules(package.__path__, package.__name__ + "."):
+            for name, value in vars(importlib.import_module(module.name)).items():
+                if hasattr(value, "signatures") and value.py_func.__module__ == module.name:
+                    found[f"{module.name}.{name}"] = set(value.signatures)
+    return found
+
+
+def test_no_decision_compiles_anything_more():
+    compile_kernels()
+    before = compiled_signatures()
+    assert sum(len(signatures) > 0 for signatures in before.values()) > 15
+    for group in (SE2_GROUP, SE3_GROUP):
+        for kind in NOISES:
+            rng = np.random.default_rng(1)
+            noise = Noise(group, kind, 10.0, 0.5, 1.0)
+            graph = random_pose_graph(rng, noise, 6, 4)
+            actions = [random_action(rng, graph, noise) for _ in range(5)]
+            for family, determinant in (
+                ("fischer", "cholesky"),
+                ("anchored", "cholesky"),
+                ("paper", "hadamard"),
+                ("paper", "cholesky"),
+            ):
+                if family == "paper" and kind != "equal":
+                    continue
+                for signature in ("spanning_trees", "von_neumann_approx"):
+                    for objective in ("joint", "map"):
+                        found = IncrementalEvaluation(graph, objective, signature, False, family, determinant, 2)
+                        found.signatures(actions)
+                        found.bounds(actions)
+                        found.entropies(actions[:2])
+    assert compiled_signatures() == before
