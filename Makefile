@@ -15,6 +15,7 @@ $(STAMP): pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
 	$(BIN)/python -m compileall -q src
 	$(BIN)/python -c 'import matplotlib.font_manager' # builds its font cache
+	$(BIN)/python -m topobelief.planning.compile_kernels # once a machine, half a minute
 	touch $(STAMP)
 
 demo: install

@@ -78,6 +78,45 @@ def test_anchored_bounds_enclose_and_rule_out_more_than_fischers():
     assert anchored.error_bound < fischer.error_bound
 
 
+def flat(sigma_rotation: float) -> tuple[PoseGraph, list[Action]]:
+    """The same session with another noise of rotations."""
+    omega = np.diag([100.0, 100.0, sigma_rotation**-2])
+    graph, actions = session(6)
+    return PoseGraph(graph.poses, graph.edges, None, omega), [
+        Action(action.poses, action.edges, omega, cost=action.cost) for action in actions
+    ]
+
+
+def test_the_family_is_chosen_by_what_fischers_bounds_leave_open(monkeypatch):
+    chosen = {}
+    for sigma in (1e-3, 0.3):
+        graph, actions = flat(sigma)
+        decision = decided(monkeypatch, 0, graph, actions, "optimal", bounds="auto")
+        fischer = decided(monkeypatch, 0, graph, actions, "bounded", bounds="fischer")
+        chosen[sigma] = decision.bounds, len(fischer.survivors) / len(actions)
+        assert decision.best == decided(monkeypatch, 0, graph, actions, "optimal", bounds="fischer").best
+        assert decision.proven_optimal
+    assert chosen[1e-3][0] == "fischer"
+    assert chosen[1e-3][1] < 0.5
+    assert chosen[0.3][0] == "anchored"
+    assert chosen[0.3][1] > 0.5
+
+
+def test_each_decision_chooses_its_family_anew(monkeypatch):
+    monkeypatch.setattr(planner_module, "_INCREMENTAL_WORK", 0)
+    graph, actions = flat(0.3)
+    planner = Planner(graph, bounds="auto")
+    assert planner.decide(actions).bounds == "anchored"
+    ruled_out = [Action(action.poses, action.edges, action.information, cost=1e3 * n) for n, action in enumerate(actions)]
+    assert planner.decide(ruled_out).bounds == "fischer"
+    assert planner.decide(actions).bounds == "anchored"
+
+
+def test_few_actions_take_fischers_bounds_without_a_trial():
+    graph, actions = flat(0.3)
+    assert Planner(graph, bounds="auto").decide(actions).bounds == "fischer"
+
+
 def test_an_action_beyond_double_precision_is_named_by_increments_too(monkeypatch):
     monkeypatch.setattr(planner_module, "_INCREMENTAL_WORK", 0)
     graph, actions = session(4, num_actions=3)

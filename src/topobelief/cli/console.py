@@ -9,7 +9,7 @@ from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 
 from rich.console import Console, RenderableType
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, ProgressColumn, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
 
 Update = Callable[[int, int], None]
 """Called with how much is done, and out of how much."""
@@ -46,11 +46,21 @@ class Reporter:
     @contextmanager
     def stage(self, name: str) -> Generator[Update]:
         """Time a stage and show it on stderr while it lasts, where that is a terminal."""
-        begin = time.perf_counter()
-        columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-        with Progress(*columns, console=self._progress, transient=True, disable=not self._progress.is_terminal) as bar:
-            task = bar.add_task(name, total=None)
+        with self._timed(name, BarColumn()) as (bar, task):
             yield lambda done, total: bar.update(task, completed=done, total=total, description=f"{name} {done}/{total}")
+
+    @contextmanager
+    def activity(self, name: str) -> Generator[Callable[[str], None]]:
+        """As `stage`, for work whose parts have names in place of numbers."""
+        with self._timed(name) as (bar, task):
+            yield lambda part: bar.update(task, description=f"{name} {part}")
+
+    @contextmanager
+    def _timed(self, name: str, *columns: ProgressColumn) -> Generator[tuple[Progress, TaskID]]:
+        begin = time.perf_counter()
+        shown = (SpinnerColumn(), TextColumn("{task.description}"), *columns, TimeElapsedColumn())
+        with Progress(*shown, console=self._progress, transient=True, disable=not self._progress.is_terminal) as bar:
+            yield bar, bar.add_task(name, total=None)
         self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - begin
 
     def time_taken(self) -> str:

@@ -167,8 +167,29 @@ def check_actions(graph: PoseGraph, actions: Sequence[Action]) -> None:
     """
     if len(actions) == 0:
         raise InvalidActionError("expected at least one action to choose from, got none")
-    for index, action in enumerate(actions):
-        check_action(graph, action, index=index)
+    if not _all_fit(graph, actions):
+        for index, action in enumerate(actions):
+            check_action(graph, action, index=index)
+
+
+def _all_fit(graph: PoseGraph, actions: Sequence[Action]) -> bool:
+    """Whether `check_action` finds nothing wrong, told at once for all."""
+    sizes, columns = (0, graph.tangent_dim), graph.poses.shape[1]
+    if not all(
+        action.information.shape[-1] in sizes and (len(action.poses) == 0 or action.poses.shape[1] == columns)
+        for action in actions
+    ):
+        return False
+    num_new = np.array([action.num_new_poses for action in actions])
+    which = np.repeat(np.arange(len(actions)), [len(action.edges) for action in actions])
+    edges = np.concatenate([action.edges for action in actions])
+    if (edges >= graph.num_poses + num_new[which, None]).any() or (edges[:, 0] == edges[:, 1]).any():
+        return False
+    first = np.cumsum(num_new) - num_new  # all new poses in a row, behind the prior as one node, 0
+    contracted = np.where(edges < graph.num_poses, 0, edges - graph.num_poses + 1 + first[which, None])
+    contracted = contracted[contracted[:, 0] != contracted[:, 1]]
+    labels = Topology(int(num_new.sum()) + 1, contracted).component_labels
+    return bool((labels == labels[0]).all())
 
 
 def posterior(graph: PoseGraph, action: Action) -> PoseGraph:

@@ -41,7 +41,7 @@ def to_gtsam(graph: PoseGraph) -> tuple[Any, Any]:
     InvalidInputError
         If an id is negative, which no GTSAM key can be.
     """
-    gtsam = _gtsam()
+    gtsam = load_gtsam()
     if (graph.ids < 0).any():
         raise InvalidInputError(f"expected ids from 0 as GTSAM keys, got {graph.ids.min()}")
     planar = graph.group is SE2_GROUP
@@ -75,7 +75,7 @@ def from_gtsam(factors: Any, values: Any) -> PoseGraph:
     InvalidGraphError
         If the graph itself is malformed, for example a self-loop.
     """
-    gtsam = _gtsam()
+    gtsam = load_gtsam()
     keys: list[int] = sorted(values.keys())
     index_of = {key: index for index, key in enumerate(keys)}
     poses = [_value(gtsam, values, key) for key in keys]
@@ -114,7 +114,7 @@ def from_gtsam(factors: Any, values: Any) -> PoseGraph:
     )
 
 
-def _gtsam() -> Any:
+def load_gtsam() -> Any:
     """GTSAM, whose bindings carry no usable types; loaded when first used."""
     try:
         return importlib.import_module("gtsam")

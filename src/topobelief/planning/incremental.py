@@ -12,6 +12,9 @@ I + R is the covariance of what the closures will see. Right: Fischer's inequali
 see of the positions when the rotation rows are known, is at least what is left when all rotations are known; then the position
 rows are those of I_pp, whose own increment by the closures is ln det (I + R_pp|r). Where nothing is closed, all three meet.
 
+The family "auto" is settled by the first actions whose bounds are asked for: Fischer's bounds of a few of them tell how many
+they would leave open, and each of those costs an exact value, about as much as an anchored bound of any action.
+
 Every value has an estimate of its rounding error, by which bounds are widened. Where a factor is not to be trusted, or an
 action closes so many loops that its dense part costs more than the graph, the action is evaluated from scratch.
 """
@@ -19,6 +22,7 @@ action closes so many loops that its dense part costs more than the graph, the a
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from functools import cached_property
 from typing import ClassVar
 
@@ -38,6 +42,8 @@ from topobelief.planning.posterior_forms import Estimates, PosteriorForms, Prior
 from topobelief.signatures.degree_increments import DegreeEntropy
 
 _MAX_CLOSURE_ROWS = 1500  # a dense Cholesky factor of this size takes as long as a sparse one of a large graph
+_SAMPLE_SIZE = 32  # actions whose bounds tell which family to take
+_OPEN_SHARE = 0.5  # what Fischer's bounds may leave open: they and so many exact values cost as much as anchored bounds of all
 _may_overflow = np.errstate(over="ignore", divide="ignore", invalid="ignore")  # what is not finite is refused
 
 
@@ -49,7 +55,7 @@ class IncrementalEvaluation:
     graph
         The prior; connected.
     objective, signature, normalized, family, determinant, anchor
-        As for `topobelief.Planner`; `family` may be "anchored" too.
+        As for `topobelief.Planner`; `family` is its `bounds`.
     """
 
     batch_size: ClassVar[int] = 1024  # smaller batches compute the paths that actions share more often
@@ -68,7 +74,7 @@ class IncrementalEvaluation:
         self.objective: ObjectiveName = objective
         self.signature: SignatureName = signature
         self.family, self.determinant = family, determinant
-        from_scratch = "fischer" if family == "anchored" else family
+        from_scratch = "fischer" if family in ("anchored", "auto") else family
         self._scratch = ScratchEvaluation(graph, objective, signature, normalized, from_scratch, determinant, anchor)
         self._prior = PriorForms(graph, anchor)
         self._current = PosteriorForms(self._prior, ActionBatch(graph, ()))
@@ -88,9 +94,15 @@ class IncrementalEvaluation:
         values, errors = self._evaluate(actions, at_once, lambda action: _pair(self._scratch.of(action).signature()))
         return values, errors
 
+    def for_one_decision(self) -> IncrementalEvaluation:
+        """One that shares all factors with this, but settles "auto" for itself."""
+        return copy(self)
+
     @_may_overflow
     def bounds(self, actions: Sequence[Action]) -> tuple[FloatArray, FloatArray]:
         """LB and UB of the objective, cost excluded, widened by their rounding errors; each of shape (K,)."""
+        if self.family == "auto":
+            self.family = self._cheaper_family(actions)
         family = {"fischer": self._fischer, "paper": self._paper, "anchored": self._anchored}[self.family]
 
         def at_once(forms: PosteriorForms) -> FloatArray:
@@ -123,6 +135,16 @@ class IncrementalEvaluation:
                 return known[0], known[1]
         values, errors = self._evaluate(actions, at_once, lambda action: _pair(self._scratch.of(action).entropy()))
         return values, errors
+
+    def _cheaper_family(self, actions: Sequence[Action]) -> str:
+        """The family by which a proof is expected to cost less."""
+        places: list[int] = np.unique(np.linspace(0, len(actions) - 1, _SAMPLE_SIZE).astype(int)).tolist()
+        sample = [actions[place] for place in places]
+        trial = self.for_one_decision()
+        trial.family = "fischer"
+        lower, upper = np.stack(trial.bounds(sample)) + np.array([action.cost for action in sample])
+        num_open = np.count_nonzero(lower <= upper.min()) - 1  # without the best
+        return "fischer" if num_open <= _OPEN_SHARE * (len(sample) - 1) else "anchored"
 
     def _evaluate(
         self,

@@ -15,7 +15,7 @@ import math
 from collections.abc import Sequence
 from functools import cached_property
 from importlib.util import find_spec
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
@@ -34,9 +34,12 @@ from topobelief.planning.objectives import ObjectiveName
 from topobelief.planning.search import Clock, Progress, Search, named_quantity
 from topobelief.signatures.von_neumann import DENSE_SPECTRUM_SIZE, expected_spectrum_seconds
 
-_INCREMENTAL_WORK = 1_000_000  # actions times edges of the prior from which increments pay
+if TYPE_CHECKING:
+    from topobelief.planning.incremental import IncrementalEvaluation
 
-BoundsName = Literal["paper", "fischer", "anchored"]
+_INCREMENTAL_WORK = 250_000  # actions times edges of the prior from which increments pay
+
+BoundsName = Literal["paper", "fischer", "anchored", "auto"]
 Proof = Literal["none", "bounded", "optimal"]
 
 
@@ -54,7 +57,9 @@ class Planner:
         What ranks the actions: "spanning_trees", "von_neumann" (dense spectrum) or "von_neumann_approx" (degrees).
     bounds
         Family of bounds: "fischer" (any noise), "paper" (one block-isotropic Omega) or "anchored" (any noise: exact prior,
-        bounded increment; far tighter, and about as dear as exact values; needs the extra `fast`).
+        bounded increment; far tighter, and about as dear as exact values; needs the extra `fast`). "auto": anchored where
+        many actions are evaluated by increments and Fischer's bounds of some of them leave more than half open, else
+        Fischer's; the decision says which.
     determinant
         "cholesky" or "hadamard" (looser, cheaper), in the lower bound of J.
     anchor
@@ -109,7 +114,8 @@ class Planner:
         if bounds == "paper":
             require_equal_noise(fisher_rows(graph))
         self._bounds = bounds
-        self._choices = (graph, objective, signature, normalized, bounds, determinant, anchor)
+        self._choices = (graph, objective, signature, normalized)
+        self._determinant, self._anchor = determinant, anchor
 
     @property
     def graph(self) -> PoseGraph:
@@ -205,18 +211,19 @@ class Planner:
         """From scratch, or by increments where that is worth the compiled kernels' time to load."""
         worthwhile = num_actions * self._graph.num_edges >= _INCREMENTAL_WORK and _has_kernels()
         if worthwhile or self._bounds == "anchored":
-            return self._incremental
+            return self._incremental.for_one_decision() if self._bounds == "auto" else self._incremental
         return self._scratch
 
     @cached_property
-    def _scratch(self) -> Evaluation:
-        return ScratchEvaluation(*self._choices)
+    def _scratch(self) -> ScratchEvaluation:
+        family = "fischer" if self._bounds == "auto" else self._bounds
+        return ScratchEvaluation(*self._choices, family, self._determinant, self._anchor)
 
     @cached_property
-    def _incremental(self) -> Evaluation:
+    def _incremental(self) -> IncrementalEvaluation:
         from topobelief.planning.incremental import IncrementalEvaluation  # loads numba
 
-        return IncrementalEvaluation(*self._choices)
+        return IncrementalEvaluation(*self._choices, self._bounds, self._determinant, self._anchor)
 
     def _refuse_dense_spectrum(self, num_poses: int) -> None:
         if num_poses > self._largest_spectrum:

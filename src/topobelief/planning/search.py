@@ -191,19 +191,24 @@ class Search:
             margin_met=margin_met,
             num_evaluations=int(np.count_nonzero(~np.isnan(self._entropies))),
             proven_optimal=proven,
-            candidates=tuple(self._candidate(action) for action in self._actions),
+            candidates=tuple(
+                Candidate(action.label, action.num_new_poses, action.num_closures, length, action.cost)
+                for action, length in zip(self._actions, self._lengths(), strict=True)
+            ),
             objective=session.objective,
             signature=session.signature,
             bounds=session.family,
             determinant=session.determinant,
         )
 
-    def _candidate(self, action: Action) -> Candidate:
-        graph = self._evaluation.graph
-        k = graph.group.position_dim
-        path = np.concatenate([graph.positions[-1:], action.poses[:, :k]]) if action.num_new_poses else np.zeros((1, k))
-        length = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
-        return Candidate(action.label, action.num_new_poses, action.num_closures, length, action.cost)
+    def _lengths(self) -> list[float]:
+        """Of the paths along each action's new poses, from the graph's last one on."""
+        graph, num_new = self._evaluation.graph, [action.num_new_poses for action in self._actions]
+        k, which = graph.group.position_dim, np.repeat(np.arange(len(num_new)), num_new)
+        path = np.concatenate([np.zeros((0, k)), *(action.poses[:, :k] for action in self._actions if action.num_new_poses)])
+        before = np.roll(path, 1, axis=0)
+        before[np.diff(which, prepend=-1) > 0] = graph.positions[-1]
+        return np.bincount(which, weights=np.linalg.norm(path - before, axis=1), minlength=len(num_new)).tolist()
 
 
 def _descending(scores: FloatArray, *, tolerance: float) -> list[int]:

@@ -1,0 +1,85 @@
+"""`topobelief benchmark`: how long decisions take, beside standard belief space planning, in one run."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def benchmark(
+    graph_files: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="[GRAPH]...", help="Pose graphs to measure beside generated ones, .g2o or .toro."),
+    ] = None,
+    sizes: Annotated[
+        str | None, typer.Option(help="Poses of the generated graphs, by commas.  [default: 1000,3500,10000,100000]")
+    ] = None,
+    candidates: Annotated[int | None, typer.Option(help="Actions of a session.  [default: 1000]", min=2)] = None,
+    repeat: Annotated[int | None, typer.Option(help="Repetitions of each timing.  [default: 5]", min=1)] = None,
+    seed: Annotated[int, typer.Option(help="Of generated graphs and of candidates.", min=0)] = 0,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A small graph and few candidates, for a first look: about a minute.")
+    ] = False,
+    out: Annotated[Path | None, typer.Option(help="Folder for benchmark.json.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")] = False,
+) -> None:
+    """Time this engine beside GTSAM, sparse factorisations from scratch and the determinant lemma.
+
+    Ratios come first: all of a session's actions, set-up included. Memory, error bounds and proofs follow. Other work on the
+    machine distorts the figures. Needs the extras fast and gtsam.
+    """
+    from topobelief.cli.console import Reporter
+    from topobelief.cli.plan_files import checked_folder
+
+    reporter, folder = Reporter(as_json=as_json), checked_folder(out)
+    with reporter.stage("start-up"):
+        from topobelief.errors import FileError
+        from topobelief.experiments.benchmark.run import BenchmarkPlan, BenchmarkResult, require_packages, run_benchmark
+        from topobelief.io.files import atomic_file
+        from topobelief.report.benchmark_tables import benchmark_tables
+
+        require_packages()
+    for path in graph_files or ():
+        if not path.is_file():
+            raise FileError(path, "expected a pose graph to read, got no such file")
+    base = BenchmarkPlan.quick() if quick else BenchmarkPlan()
+    plan = replace(
+        base,
+        sizes=base.sizes if sizes is None else parse_sizes(sizes),
+        files=tuple(graph_files or ()),
+        num_actions=candidates or base.num_actions,
+        repetitions=repeat or base.repetitions,
+        seed=seed,
+    )
+    result: BenchmarkResult | None = None
+    with reporter.activity("measuring") as tell:
+        for result in run_benchmark(plan, progress=tell):
+            if folder is not None:  # after every part, so that an interrupted run leaves what it has
+                folder.mkdir(parents=True, exist_ok=True)
+                with atomic_file(folder / "benchmark.json") as path:
+                    path.write_text(json.dumps(result.to_dict(), indent=2), encoding="utf-8")
+    if result is not None:
+        reporter.say(*benchmark_tables(result))
+        reporter.answer(result.to_dict())
+    if folder is not None:
+        reporter.say(f"All numbers: {folder / 'benchmark.json'}")
+
+
+def parse_sizes(text: str) -> tuple[int, ...]:
+    """Numbers of poses, by commas.
+
+    Raises
+    ------
+    InvalidInputError
+        Where one is not a whole number.
+    """
+    from topobelief.errors import InvalidInputError
+
+    try:
+        return tuple(int(part) for part in text.split(",") if part.strip())
+    except ValueError:
+        raise InvalidInputError(f'expected --sizes as whole numbers by commas, such as 1000,10000, got "{text}"') from None

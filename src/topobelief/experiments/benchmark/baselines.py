@@ -1,0 +1,249 @@
+"""What is done today to evaluate one action, as lean as it can be made: prepared once, then called for each action.
+
+Each method has its quantity as a number, so that a benchmark can check that all methods of one quantity agree. What does not
+depend on the method is prepared outside the clock: the posterior graph for the methods that evaluate it from scratch (for
+GTSAM its factors and values too).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import qdldl
+from scipy import linalg
+
+from topobelief.arrays import FloatArray, IntArray
+from topobelief.graph.action import Action, posterior
+from topobelief.graph.fisher import fisher_rows
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.io.gtsam import load_gtsam, to_gtsam
+from topobelief.linalg.block_pattern import BlockPattern
+from topobelief.linalg.edge_form import EdgeForm, laplacian_form
+from topobelief.signatures.von_neumann import von_neumann_entropy, von_neumann_entropy_approx
+
+_QDLDL: Any = qdldl  # ships no types
+
+Quantity = Literal["log det I", "tau", "s_VN", "s_VN by degrees"]
+
+BaselineKind = Literal["standard", "lemma", "topology"]
+
+Evaluate = Callable[[], float]
+"""The clock runs while it is called."""
+
+
+@dataclass(frozen=True, slots=True)
+class Baseline:
+    """A way to evaluate actions one by one.
+
+    Attributes
+    ----------
+    name
+    quantity
+        What it computes.
+    kind
+        "standard": standard belief space planning, from scratch; "lemma": the same by the determinant lemma; "topology":
+        signatures from scratch.
+    largest_graph
+        Poses of the prior above which it would take minutes or more memory than there is.
+    prepare
+        Called with the prior, on the clock of what is paid once per session; gives what makes an action, outside the clock,
+        ready to be evaluated.
+    """
+
+    name: str
+    quantity: Quantity
+    kind: BaselineKind
+    largest_graph: float
+    prepare: Callable[[PoseGraph], Callable[[Action], Evaluate]]
+
+
+def baselines() -> tuple[Baseline, ...]:
+    """All of them, the standard ones first."""
+    return (
+        Baseline("standard BSP, GTSAM, COLAMD", "log det I", "standard", math.inf, _gtsam_elimination("COLAMD")),
+        Baseline("standard BSP, GTSAM, METIS", "log det I", "standard", math.inf, _gtsam_elimination("METIS")),
+        Baseline("standard BSP, sparse LDLᵀ", "log det I", "standard", math.inf, _sparse_information),
+        Baseline("rAMDL on iSAM2's joint marginals", "log det I", "lemma", math.inf, _ramdl_on_isam2),
+        Baseline("rAMDL on the dense covariance", "log det I", "lemma", 3500, _ramdl_on_dense_covariance),
+        Baseline("t-BSP from scratch, s_ST", "tau", "topology", math.inf, _spanning_trees),
+        Baseline("t-BSP from scratch, ŝ_VN", "s_VN by degrees", "topology", math.inf, _von_neumann_approx),
+        Baseline("t-BSP from scratch, exact s_VN", "s_VN", "topology", 2000, _von_neumann),
+    )
+
+
+def anchor_of(graph: PoseGraph) -> int:
+    """The pose that all methods hold."""
+    return graph.num_poses - 1
+
+
+# Standard belief space planning
+
+
+def _gtsam_elimination(ordering: str) -> Callable[[PoseGraph], Callable[[Action], Evaluate]]:
+    """Linearise the whole posterior and eliminate it into a Bayes tree."""
+
+    def prepare(graph: PoseGraph) -> Callable[[Action], Evaluate]:
+        ordering_type = getattr(load_gtsam().Ordering.OrderingType, ordering)
+
+        def ready(action: Action) -> Evaluate:
+            factors, values = _held_factors(posterior(graph, action), anchor_of(graph))
+
+            def evaluate() -> float:
+                return 2 * float(factors.linearize(values).eliminateMultifrontal(ordering_type).logDeterminant())
+
+            return evaluate
+
+        return ready
+
+    return prepare
+
+
+def _sparse_information(graph: PoseGraph) -> Callable[[Action], Evaluate]:
+    """Information matrix of the whole posterior, assembled in compressed columns, and its L D L^T factor."""
+    prior_rows = fisher_rows(graph)
+
+    def ready(action: Action) -> Evaluate:
+        after = posterior(graph, action)
+
+        def evaluate() -> float:
+            rows = prior_rows.joined(fisher_rows(after, first_edge=graph.num_edges))
+            return _log_det(rows.joint(), after.num_poses, anchor_of(graph))
+
+        return evaluate
+
+    return ready
+
+
+# Standard belief space planning by the augmented matrix determinant lemma (Kopitkov and Indelman, IJRR 2017)
+
+
+def _ramdl_on_isam2(graph: PoseGraph) -> Callable[[Action], Evaluate]:
+    gtsam = load_gtsam()
+    factors, values = _held_factors(graph, anchor_of(graph))
+    inference = gtsam.ISAM2()
+    inference.update(factors, values)
+    log_det = 2 * float(factors.linearize(values).eliminateMultifrontal(gtsam.Ordering.OrderingType.COLAMD).logDeterminant())
+    k, kappa = graph.group.position_dim, graph.tangent_dim
+    order = np.arange(3) if kappa == 3 else np.array([3, 4, 5, 0, 1, 2])
+
+    def covariance(touched: IntArray) -> FloatArray:
+        """Of the touched poses, shape (len(touched) kappa, len(touched) kappa); GTSAM's is in each pose's own frame."""
+        inference.deleteCachedShortcuts()  # else later actions would reuse the marginals of earlier ones
+        keys: list[int] = graph.ids[touched].tolist()
+        joint = inference.jointMarginalCovariance(keys)
+        ranks = np.argsort(np.argsort(keys))  # GTSAM sorts keys
+        indices = (ranks[:, None] * kappa + order).ravel()
+        matrix: FloatArray = joint.fullMatrix()[np.ix_(indices, indices)]
+        turn = np.tile(np.eye(kappa), (len(touched), 1, 1))
+        turn[:, :k, :k] = graph.group.rotation_matrix(graph.poses[touched])
+        if kappa == 6:
+            turn[:, k:, k:] = turn[:, :k, :k]
+        blocks = matrix.reshape(len(touched), kappa, len(touched), kappa)
+        return np.einsum("iab,ibjd,jcd->iajc", turn, blocks, turn, optimize=True).reshape(matrix.shape)
+
+    return lambda action: _ramdl(graph, action, log_det, covariance)
+
+
+def _ramdl_on_dense_covariance(graph: PoseGraph) -> Callable[[Action], Evaluate]:
+    """The whole covariance matrix of the prior, once."""
+    kappa, anchor = graph.tangent_dim, anchor_of(graph)
+    free = np.arange(graph.num_poses) != anchor
+    form = fisher_rows(graph).joint()
+    upper = BlockPattern.build(graph.edges, free, form.block_size).upper(form).toarray()
+    factor, _ = linalg.cho_factor(upper, lower=False, overwrite_a=True, check_finite=False)
+    log_det = 2 * float(np.log(np.diag(factor)).sum())
+    inverse, _ = linalg.lapack.dpotri(factor, lower=0, overwrite_c=1)
+    position = np.cumsum(free) - 1
+
+    def covariance(touched: IntArray) -> FloatArray:
+        places, known = position[touched], touched != anchor
+        indices = (places[known][:, None] * kappa + np.arange(kappa)).ravel()
+        within = (np.flatnonzero(known)[:, None] * kappa + np.arange(kappa)).ravel()
+        matrix = np.zeros((len(touched) * kappa, len(touched) * kappa))
+        part = inverse[np.minimum(indices[:, None], indices), np.maximum(indices[:, None], indices)]
+        matrix[np.ix_(within, within)] = part
+        return matrix
+
+    return lambda action: _ramdl(graph, action, log_det, covariance)
+
+
+def _held_factors(graph: PoseGraph, anchor: int) -> tuple[Any, Any]:
+    """Factors and values, measurements as the poses predict them.
+
+    Relative measurements leave a rigid motion free, so that a unit prior on one pose multiplies the determinant by 1.
+    """
+    gtsam = load_gtsam()
+    factors, values = to_gtsam(PoseGraph(graph.poses, graph.edges, None, graph.information, ids=graph.ids))
+    key = int(graph.ids[anchor])
+    prior, pose = (
+        (gtsam.PriorFactorPose2, values.atPose2) if graph.tangent_dim == 3 else (gtsam.PriorFactorPose3, values.atPose3)
+    )
+    factors.add(prior(key, pose(key), gtsam.noiseModel.Unit.Create(graph.tangent_dim)))
+    return factors, values
+
+
+def _ramdl(graph: PoseGraph, action: Action, log_det: float, covariance: Callable[[IntArray], FloatArray]) -> Evaluate:
+    """ln det I' = ln det I + ln det D + ln det (A_n^T D^-1 A_n), D = 1 + A_o Sigma A_o^T; o old poses touched, n new ones."""
+    after = posterior(graph, action)
+
+    def evaluate() -> float:
+        form = fisher_rows(after, first_edge=graph.num_edges).joint()
+        touched = np.unique(action.edges[action.edges < graph.num_poses])
+        columns = np.concatenate([touched, np.arange(graph.num_poses, after.num_poses)])
+        num_edges, num_rows, b = form.rows_i.shape
+        rows = np.zeros((num_edges, num_rows, len(columns), b))
+        for ends, values in zip(form.edges.T, (form.rows_i, form.rows_j), strict=True):
+            rows[np.arange(num_edges), :, np.searchsorted(columns, ends)] = values
+        dense = rows.reshape(num_edges * num_rows, -1)
+        old, new = dense[:, : b * len(touched)], dense[:, b * len(touched) :]
+        seen = np.eye(len(dense)) + old @ covariance(touched) @ old.T
+        factor = linalg.cholesky(seen, lower=True, overwrite_a=True, check_finite=False)
+        whitened = linalg.solve_triangular(factor, new, lower=True, check_finite=False)
+        gain = linalg.cholesky(whitened.T @ whitened, lower=True, overwrite_a=True, check_finite=False)
+        return log_det + 2 * float(np.log(np.diag(factor)).sum() + np.log(np.diag(gain)).sum())
+
+    return evaluate
+
+
+# t-BSP from scratch, as in the paper
+
+
+def _spanning_trees(graph: PoseGraph) -> Callable[[Action], Evaluate]:
+    """Reduced Laplacian of the posterior, without weights, and its L D L^T factor."""
+
+    def ready(action: Action) -> Evaluate:
+        after = posterior(graph, action)
+
+        def evaluate() -> float:
+            return _log_det(laplacian_form(after.edges, np.ones(after.num_edges)), after.num_poses, anchor_of(graph))
+
+        return evaluate
+
+    return ready
+
+
+def _von_neumann_approx(graph: PoseGraph) -> Callable[[Action], Evaluate]:
+    def ready(action: Action) -> Evaluate:
+        topology = posterior(graph, action).topology
+        return lambda: von_neumann_entropy_approx(topology)
+
+    return ready
+
+
+def _von_neumann(graph: PoseGraph) -> Callable[[Action], Evaluate]:
+    def ready(action: Action) -> Evaluate:
+        topology = posterior(graph, action).topology
+        return lambda: von_neumann_entropy(topology)
+
+    return ready
+
+
+def _log_det(form: EdgeForm, num_nodes: int, held: int) -> float:
+    """Sum of the logarithms of D in a fresh L D L^T factorisation."""
+    pattern = BlockPattern.build(form.edges, np.arange(num_nodes) != held, form.block_size)
+    _, diagonal, _ = _QDLDL.Solver(pattern.upper(form), upper=True).factors()
+    return float(np.log(diagonal).sum())

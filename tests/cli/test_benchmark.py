@@ -1,0 +1,72 @@
+"""`topobelief benchmark` measures, writes what it has after every part, and refuses what it cannot measure."""
+
+import json
+
+import pytest
+
+from topobelief.cli.app import run
+from topobelief.experiments.benchmark.run import SCHEMA, BenchmarkPlan
+
+
+@pytest.fixture
+def tiny(monkeypatch):
+    plan = BenchmarkPlan(
+        sizes=(30,), num_actions=3, repetitions=1, num_seeds=1, bounds_size=40, bounds_actions=4, memory_sizes=(20,)
+    )
+    monkeypatch.setattr(BenchmarkPlan, "quick", staticmethod(lambda: plan))
+
+
+def test_a_benchmark_prints_tables_and_writes_its_numbers(tiny, tmp_path, capsys):
+    assert run(["benchmark", "--quick", "--out", str(tmp_path / "new")]) == 0
+    shown = capsys.readouterr().out
+    for text in (
+        "× GTSAM",
+        "this engine: proven optimum",
+        "Peak memory",
+        "ΔJ_max",
+        "generated, 30: 30 poses",
+        "benchmark.json",
+    ):
+        assert text in shown
+    document = json.loads((tmp_path / "new" / "benchmark.json").read_text())
+    assert document["schema"] == SCHEMA
+    assert len(document["sessions"]) == len(document["memory"]) == 1
+    assert [path.name for path in (tmp_path / "new").iterdir()] == ["benchmark.json"]
+
+
+def test_options_go_before_the_quick_plan_and_json_is_all_that_is_printed(tiny, capsys):
+    assert run(["benchmark", "--quick", "--sizes", "25,35", "--candidates", "2", "--seed", "3", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert [session["num_poses"] for session in document["sessions"]] == [25, 35]
+    assert (document["plan"]["num_actions"], document["plan"]["seed"]) == (2, 3)
+
+
+def test_an_interrupted_benchmark_leaves_what_it_has(tiny, tmp_path, monkeypatch, capsys):
+    from topobelief.experiments.benchmark import run as module
+
+    def interrupt(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(module, "peak_gigabytes", interrupt)
+    assert run(["benchmark", "--quick", "--out", str(tmp_path)]) == 130
+    document = json.loads((tmp_path / "benchmark.json").read_text())
+    assert len(document["sessions"]) == 1
+    assert document["memory"] == []
+    assert "interrupted" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["no-such.g2o"], "no-such.g2o: expected a pose graph to read"),
+        (["--sizes", "many"], 'expected --sizes as whole numbers by commas, such as 1000,10000, got "many"'),
+        (["--sizes", "1"], "expected sizes of at least 2, got 1"),
+        (["--candidates", "1"], "--candidates"),
+    ],
+)
+def test_bad_input_is_one_line_and_leaves_nothing(arguments, message, tmp_path, capsys):
+    assert run(["benchmark", *arguments, "--out", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "out").exists()
