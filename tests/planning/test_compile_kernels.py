@@ -8,6 +8,7 @@ import numpy as np
 import topobelief.linalg
 import topobelief.signatures
 from graphs import NOISES, SE2_GROUP, SE3_GROUP, Noise, random_action, random_pose_graph
+from topobelief.graph.action import posterior
 from topobelief.planning.compile_kernels import compile_kernels
 from topobelief.planning.incremental import IncrementalEvaluation
 
@@ -47,4 +48,6 @@ def test_no_decision_compiles_anything_more():
                         found.signatures(actions)
                         found.bounds(actions)
                         found.entropies(actions[:2])
+                        grown = posterior(graph, actions[0])
+                        found.extended(grown, 1).bounds([random_action(rng, grown, noise)])
     assert compiled_signatures() == before

@@ -17,7 +17,7 @@ OBJECTIVES = ("joint", "map", "per_pose")
 
 
 def random_session(rng: np.random.Generator) -> tuple[PoseGraph, list[Action]]:
-    """Up to 14 poses and 8 actions of any noise, xi times the edge length from 1e-4 to 1e2; some ties, some without closures."""
+    """Up to 14 poses and 8 actions of any noise, xi times the edge length 1e-4 to 1e2; some ties, some without closures."""
     group = (SE2_GROUP, SE3_GROUP)[rng.integers(2)]
     length = float(10 ** rng.uniform(-1, 1))
     noise = Noise(

@@ -142,10 +142,27 @@ def subtract_columns(
 
 
 @compiled
-def factorize(axes: tuple[int, ...], start: IntArray, rows: Int32Array, diagonal: FloatArray, blocks: FloatArray) -> bool:
+def copy_columns(
+    start: IntArray, columns: IntArray, old_start: IntArray, old_columns: IntArray, old_blocks: FloatArray, blocks: FloatArray
+) -> None:
+    """Copy columns of one factor to their places in another, in which they have as many rows."""
+    b = blocks.shape[1]
+    for k in range(len(columns)):
+        p, q = start[columns[k]], old_start[old_columns[k]]
+        for m in range(start[columns[k] + 1] - p):
+            for c in range(b):
+                for d in range(b):
+                    blocks[p + m, c, d] = old_blocks[q + m, c, d]
+
+
+@compiled
+def factorize(
+    axes: tuple[int, ...], start: IntArray, rows: Int32Array, done: BoolArray, diagonal: FloatArray, blocks: FloatArray
+) -> bool:
     """Replace the blocks of M by those of l, column by column, left-looking; False where a pivot is not positive.
 
     Columns that follow each other with the same rows (a supernode) wait together for the row at which they are needed next.
+    Columns that are done hold l already.
     """
     b, n = len(axes), len(diagonal)
     last = np.empty(n, np.int64)  # last column of each one's supernode
@@ -162,46 +179,66 @@ def factorize(axes: tuple[int, ...], start: IntArray, rows: Int32Array, diagonal
         waiting = int(head[j])
         while waiting >= 0:
             following, count = int(link[waiting]), int(left[waiting])
-            subtract_columns(axes, rows, blocks, waiting, int(last[waiting]), start, count, work)
+            if not done[j]:
+                subtract_columns(axes, rows, blocks, waiting, int(last[waiting]), start, count, work)
             left[waiting] -= 1
             if count > 1:
                 row = rows[start[last[waiting] + 1] - count + 1]
                 link[waiting], head[row] = head[row], waiting
             waiting = following
-        if first < j:
-            subtract_columns(axes, rows, blocks, first, j - 1, start, start[j + 1] - start[j] + 1, work)
-        for c in range(b):
-            for d in range(b):
-                diagonal[j, c, d] += work[j, c, d]
-                work[j, c, d] = 0.0
-        for p in range(start[j], start[j + 1]):
-            for c in range(b):
-                for d in range(b):
-                    blocks[p, c, d] += work[rows[p], c, d]
-                    work[rows[p], c, d] = 0.0
-        for c in range(b):
-            for d in range(c + 1):
-                total = diagonal[j, c, d]
-                for m in range(d):
-                    total -= diagonal[j, c, m] * diagonal[j, d, m]
-                if c > d:
-                    diagonal[j, c, d] = total / diagonal[j, d, d]
-                elif total > 0:
-                    diagonal[j, c, c] = math.sqrt(total)
-                else:
-                    return False
-            for d in range(c + 1, b):
-                diagonal[j, c, d] = 0.0
-        for p in range(start[j], start[j + 1]):
-            for c in range(b):
-                for d in range(b):
-                    total = blocks[p, c, d]
-                    for m in range(d):
-                        total -= blocks[p, c, m] * diagonal[j, d, m]
-                    blocks[p, c, d] = total / diagonal[j, d, d]
+        if not done[j]:
+            if first < j:
+                subtract_columns(axes, rows, blocks, first, j - 1, start, start[j + 1] - start[j] + 1, work)
+            if not finish_column(axes, rows, j, start[j], start[j + 1], work, diagonal, blocks):
+                return False
         if last[first] == j and start[j] < start[j + 1]:
             left[first] = start[j + 1] - start[j]
             link[first], head[rows[start[j]]] = head[rows[start[j]]], first
+    return True
+
+
+@compiled
+def finish_column(
+    axes: tuple[int, ...],
+    rows: Int32Array,
+    column: int,
+    begin: int,
+    end: int,
+    work: FloatArray,
+    diagonal: FloatArray,
+    blocks: FloatArray,
+) -> bool:
+    """Add to a column of M what earlier columns take away, by row in `work`, and divide by the root of its pivot."""
+    b = len(axes)
+    for c in range(b):
+        for d in range(b):
+            diagonal[column, c, d] += work[column, c, d]
+            work[column, c, d] = 0.0
+    for p in range(begin, end):
+        for c in range(b):
+            for d in range(b):
+                blocks[p, c, d] += work[rows[p], c, d]
+                work[rows[p], c, d] = 0.0
+    for c in range(b):
+        for d in range(c + 1):
+            total = diagonal[column, c, d]
+            for m in range(d):
+                total -= diagonal[column, c, m] * diagonal[column, d, m]
+            if c > d:
+                diagonal[column, c, d] = total / diagonal[column, d, d]
+            elif total > 0:
+                diagonal[column, c, c] = math.sqrt(total)
+            else:
+                return False
+        for d in range(c + 1, b):
+            diagonal[column, c, d] = 0.0
+    for p in range(begin, end):
+        for c in range(b):
+            for d in range(b):
+                total = blocks[p, c, d]
+                for m in range(d):
+                    total -= blocks[p, c, m] * diagonal[column, d, m]
+                blocks[p, c, d] = total / diagonal[column, d, d]
     return True
 
 

@@ -21,7 +21,15 @@ import qdldl
 from scipy import sparse
 
 from topobelief.arrays import BoolArray, FloatArray, IntArray
-from topobelief.linalg.block_cholesky import Int32Array, assemble, factorize, inverse_columns, pull, solve
+from topobelief.linalg.block_cholesky import (
+    Int32Array,
+    assemble,
+    copy_columns,
+    factorize,
+    inverse_columns,
+    pull,
+    solve,
+)
 from topobelief.linalg.compiled import compiled, in_parallel, num_threads, unset
 from topobelief.linalg.edge_form import EdgeForm
 from topobelief.linalg.log_det import UNIT_ROUNDOFF, LogDet
@@ -49,6 +57,8 @@ class EliminationTree:
         Compressed columns of the factor below its diagonal, by place; rows ascending.
     parent, depth : shape (n,)
         Place of the parent, -1 at a root; number of ancestors.
+    num_appended
+        Nodes that came last, after the rest was ordered to keep the factor sparse: all paths may be longer by so many.
     """
 
     edges: IntArray
@@ -58,6 +68,7 @@ class EliminationTree:
     rows: Int32Array
     parent: IntArray
     depth: IntArray
+    num_appended: int = 0
 
     @staticmethod
     def build(edges: IntArray, num_nodes: int, held: int) -> EliminationTree:
@@ -68,19 +79,71 @@ class EliminationTree:
         edges : shape (m, 2)
         num_nodes, held
         """
-        edges, position = edges.copy(), np.full(num_nodes, -1)
         free = np.flatnonzero(np.arange(num_nodes) != held)
         if len(free) == 0:
-            none = np.zeros(0, np.int64)
-            return EliminationTree(edges, position, none, np.zeros(1, np.int64), none.astype(np.int32), none, none)
-        lower, _, order = _QDLDL.Solver(_any_upper(edges, num_nodes, free), upper=True).factors()
-        start, rows = lower.indptr.astype(np.int64), lower.indices.astype(np.int32)
+            return EliminationTree.of_order(edges, num_nodes, free)
+        _, _, order = _QDLDL.Solver(_any_upper(edges, num_nodes, free), upper=True).factors()
+        return EliminationTree.of_order(edges, num_nodes, free[np.asarray(order, dtype=np.int64)])
+
+    @staticmethod
+    def of_order(edges: IntArray, num_nodes: int, order: IntArray, *, num_appended: int = 0) -> EliminationTree:
+        """The tree of a given order, which becomes a postorder with the same factor.
+
+        Parameters
+        ----------
+        edges : shape (m, 2)
+        num_nodes
+        order
+            Free nodes.
+        num_appended
+        """
+        edges, position = edges.copy(), np.full(num_nodes, -1)
+        position[order] = np.arange(len(order))
+        start, rows = _factor_pattern(edges, position, len(order))
         postorder = _postorder(_parents(start, rows))
         start, rows = _permuted(start, rows, postorder)
-        order = free[np.asarray(order, dtype=np.int64)[postorder]]
+        order = order[postorder]
         position[order] = np.arange(len(order))
         parent = _parents(start, rows)
-        return EliminationTree(edges, position, order, start, rows, parent, _depths(parent))
+        return EliminationTree(edges, position, order, start, rows, parent, _depths(parent), num_appended)
+
+    def adapted(self, edges: IntArray, num_nodes: int, held: int) -> EliminationTree:
+        """The tree of a grown graph, in which old nodes keep their order.
+
+        New nodes that see no old one come first: they leave the rest of the factor as it is. The others come last, behind the
+        node that was held.
+
+        Parameters
+        ----------
+        edges : shape (m, 2)
+            Of the grown graph.
+        num_nodes
+            Its nodes, the old ones first.
+        held
+            Node that is held now.
+        """
+        is_new = np.arange(num_nodes) >= self.num_nodes
+        seeing = np.zeros(num_nodes, np.bool_)
+        seeing[edges[is_new[edges].sum(axis=1) == 1]] = True
+        inner, outer = np.flatnonzero(is_new & ~seeing), np.flatnonzero(is_new & seeing)
+        order = np.concatenate([inner, self.order, np.flatnonzero(self.position < 0), outer])
+        num_appended = self.num_appended + 1 + len(outer)
+        return EliminationTree.of_order(edges, num_nodes, order[order != held], num_appended=num_appended)
+
+    @property
+    def num_nodes(self) -> int:
+        """All of them."""
+        return len(self.position)
+
+    @property
+    def held(self) -> int:
+        """The node that is not eliminated."""
+        return int(np.argmin(self.position))
+
+    @property
+    def longest_path(self) -> int:
+        """Nodes on the way from the deepest node to its root."""
+        return int(self.depth.max(initial=-1)) + 1
 
     @property
     def num_free(self) -> int:
@@ -144,7 +207,7 @@ class FormFactor:
 
     @staticmethod
     @np.errstate(over="ignore", divide="ignore", invalid="ignore")  # what is not finite has an infinite error
-    def of(tree: EliminationTree, form: EdgeForm, *, shift: float = 0.0) -> FormFactor:
+    def of(tree: EliminationTree, form: EdgeForm, *, shift: float = 0.0, known: KnownColumns | None = None) -> FormFactor:
         """Factor the form's matrix plus `shift` times I.
 
         Parameters
@@ -152,6 +215,8 @@ class FormFactor:
         tree
             Of the form's edges.
         form, shift
+        known
+            Columns of an earlier factor, of a graph that has grown, which are copied.
         """
         b, n = form.block_size, tree.num_free
         diagonal = np.zeros((n, b, b)) + shift * np.eye(b)
@@ -159,7 +224,8 @@ class FormFactor:
         rows_i, rows_j = np.ascontiguousarray(form.rows_i), np.ascontiguousarray(form.rows_j)
         assemble(tree.position, tree.edges, rows_i, rows_j, tree.start, tree.rows, diagonal, blocks)
         entries = np.diagonal(diagonal, axis1=1, axis2=2).copy()
-        if not factorize((0,) * b, tree.start, tree.rows, diagonal, blocks):
+        done = np.zeros(n, np.bool_) if known is None else known.copy_to(tree, diagonal, blocks)
+        if not factorize((0,) * b, tree.start, tree.rows, done, diagonal, blocks):
             return FormFactor(tree, diagonal, blocks, LogDet(math.nan, math.inf))
         log_pivots = 2 * np.log(np.diagonal(diagonal, axis1=1, axis2=2)).ravel()
         factor = FormFactor(tree, diagonal, blocks, LogDet(math.fsum(log_pivots), 0.0))
@@ -238,6 +304,59 @@ class FormFactor:
         return _PROBE_SAFETY / _NUM_PROBES * np.sum(samples**2, axis=2)
 
 
+class KnownColumns(NamedTuple):
+    """Columns of a factor that a grown graph leaves as they are: no node below them in the tree has changed.
+
+    Attributes
+    ----------
+    factor
+        Of the graph as it was, with the same shift.
+    changed : shape (num_nodes of the grown graph,)
+        Nodes at which an edge was added, removed or changed, and those beside a node that is or was held.
+    """
+
+    factor: FormFactor
+    changed: BoolArray
+
+    def copy_to(self, tree: EliminationTree, diagonal: FloatArray, blocks: FloatArray) -> BoolArray:
+        """Put them into the factor of the grown graph; which ones, by place, shape (n,)."""
+        old = self.factor
+        if not math.isfinite(old.log_det.error):
+            return np.zeros(tree.num_free, np.bool_)
+        marked = np.flatnonzero(self.changed[tree.order])
+        done = ~_with_ancestors(tree.parent, marked)
+        places = np.flatnonzero(done)
+        before = old.tree.position[tree.order[places]]
+        diagonal[places] = old.diagonal[before]
+        copy_columns(tree.start, places, old.tree.start, before, old.blocks, blocks)
+        return done
+
+
+def changed_nodes(old: EdgeForm, new: EdgeForm, num_nodes: int, held: tuple[int, int]) -> BoolArray:
+    """Nodes whose columns of a form's matrix a grown graph changes, shape (num_nodes,).
+
+    Parameters
+    ----------
+    old, new
+        The form on the graph as it was and as it is; edges that both have stand first, in the same order.
+    num_nodes
+        Now.
+    held
+        The nodes that were and are held.
+    """
+    changed = np.zeros(num_nodes, np.bool_)
+    common = min(len(old.edges), len(new.edges))
+    same = (old.edges[:common] == new.edges[:common]).all(axis=1)
+    for before, after in ((old.rows_i, new.rows_i), (old.rows_j, new.rows_j)):
+        same &= (before[:common] == after[:common]).all(axis=(1, 2))
+    for edges in (old.edges, new.edges):
+        touched = np.ones(len(edges), np.bool_)
+        touched[:common] = ~same
+        touched |= np.isin(edges, held).any(axis=1)
+        changed[edges[touched]] = True
+    return changed
+
+
 def _random_signs(rng: np.random.Generator, shape: tuple[int, ...]) -> FloatArray:
     return np.where(rng.integers(2, size=shape, dtype=np.int8), 1.0, -1.0)
 
@@ -254,6 +373,56 @@ def _any_upper(edges: IntArray, num_nodes: int, free: IntArray) -> sparse.csc_ar
     columns = np.concatenate([column, np.arange(len(free))])
     values = np.concatenate([np.full(len(pairs), -1.0), degrees + 1.0])
     return sparse.csc_array((values, (rows, columns)), shape=(len(free), len(free)))
+
+
+@compiled
+def _factor_pattern(edges: IntArray, position: IntArray, num_free: int) -> tuple[IntArray, Int32Array]:
+    """Compressed columns of the factor in a given order, below its diagonal; rows in any order.
+
+    The rows of a column are those of the matrix and those of its children in the tree.
+    """
+    later_start = np.zeros(num_free + 1, np.int64)
+    for e in range(len(edges)):
+        i, j = position[edges[e, 0]], position[edges[e, 1]]
+        if i >= 0 and j >= 0:
+            later_start[min(i, j) + 1] += 1
+    for j in range(num_free):
+        later_start[j + 1] += later_start[j]
+    later, cursor = np.empty(later_start[num_free], np.int32), later_start[:-1].copy()
+    for e in range(len(edges)):
+        i, j = position[edges[e, 0]], position[edges[e, 1]]
+        if i >= 0 and j >= 0:
+            later[cursor[min(i, j)]] = max(i, j)
+            cursor[min(i, j)] += 1
+    child, sibling, seen = unset(num_free), unset(num_free), unset(num_free)
+    start, rows, count = np.zeros(num_free + 1, np.int64), np.empty(4 * num_free + 1, np.int32), 0
+    for j in range(num_free):
+        most, c = later_start[j + 1] - later_start[j], child[j]
+        while c >= 0:
+            most += start[c + 1] - start[c]
+            c = sibling[c]
+        if count + most > len(rows):
+            longer = np.empty(2 * (count + most), np.int32)
+            longer[:count] = rows[:count]
+            rows = longer
+        seen[j], parent = j, num_free
+        for p in range(later_start[j], later_start[j + 1]):
+            row = later[p]
+            if seen[row] != j:
+                seen[row], rows[count], parent = j, row, min(parent, row)
+                count += 1
+        c = child[j]
+        while c >= 0:
+            for p in range(start[c], start[c + 1]):
+                row = rows[p]
+                if seen[row] != j:
+                    seen[row], rows[count], parent = j, row, min(parent, row)
+                    count += 1
+            c = sibling[c]
+        start[j + 1] = count
+        if parent < num_free:
+            sibling[j], child[parent] = child[parent], j
+    return start, rows[:count].copy()
 
 
 @compiled

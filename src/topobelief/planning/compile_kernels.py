@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from topobelief.geometry import SE2_GROUP, SE3_GROUP, Group
-from topobelief.graph.action import Action
+from topobelief.graph.action import Action, posterior
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.evaluation import SignatureName
 from topobelief.planning.incremental import IncrementalEvaluation
@@ -31,6 +31,8 @@ def compile_kernels() -> None:
                 evaluation.signatures([action])
                 evaluation.bounds([action])
                 evaluation.entropies([action])
+            grown = posterior(graph, action)
+            evaluation.extended(grown, 0).entropies([Action(grown.poses[:0], action.edges[:1], action.information[0])])
 
 
 def _ring(group: Group, coupling: float, *, num_poses: int = 70) -> tuple[PoseGraph, Action]:

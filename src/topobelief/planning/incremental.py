@@ -74,10 +74,26 @@ class IncrementalEvaluation:
         self.objective: ObjectiveName = objective
         self.signature: SignatureName = signature
         self.family, self.determinant = family, determinant
+        self._given_family = family
         from_scratch = "fischer" if family in ("anchored", "auto") else family
         self._scratch = ScratchEvaluation(graph, objective, signature, normalized, from_scratch, determinant, anchor)
         self._prior = PriorForms(graph, anchor)
         self._current = PosteriorForms(self._prior, ActionBatch(graph, ()))
+
+    def extended(self, graph: PoseGraph, anchor: int) -> IncrementalEvaluation:
+        """The same on a graph that has grown out of this one's, whose factors it takes over where it can.
+
+        Parameters
+        ----------
+        graph
+            In the same group; its first poses are those of the graph as it was.
+        anchor
+        """
+        choices = self.objective, self.signature, self.normalized, self._given_family, self.determinant
+        grown = IncrementalEvaluation(graph, *choices, anchor)
+        grown._prior = PriorForms(graph, anchor, earlier=self._prior)
+        grown._current = PosteriorForms(grown._prior, ActionBatch(graph, ()))
+        return grown
 
     @_may_overflow
     def signatures(self, actions: Sequence[Action]) -> tuple[FloatArray, FloatArray]:

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import cached_property
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Literal, get_args
 
@@ -102,25 +101,71 @@ class Planner:
         require_choice("signature", signature, get_args(SignatureName))
         require_choice("bounds", bounds, get_args(BoundsName))
         require_choice("determinant", determinant, get_args(Determinant))
-        anchor = graph.num_poses - 1 if anchor is None else checked_anchor(graph.num_poses, anchor)
-        graph.topology.require_connected(anchor=anchor, names=graph.ids)
         self._largest_spectrum = DENSE_SPECTRUM_SIZE if signature == "von_neumann" and not allow_dense_spectrum else math.inf
-        self._refuse_dense_spectrum(graph.num_poses)
-        self._graph = graph
         if bounds == "anchored" and not _has_kernels():
             raise InvalidInputError(
                 "bounds=\"anchored\" expects numba to be installed, got none; run pip install 'topobelief[fast]'"
             )
-        if bounds == "paper":
+        self._bounds: BoundsName = bounds
+        self._given_anchor = anchor
+        self._choices = (objective, signature, normalized)
+        self._determinant: Determinant = determinant
+        self._take(graph)
+        self._scratch: ScratchEvaluation | None = None
+        self._incremental: IncrementalEvaluation | None = None
+
+    def _take(self, graph: PoseGraph) -> None:
+        """Check a prior and plan on it from now on."""
+        anchor = graph.num_poses - 1 if self._given_anchor is None else checked_anchor(graph.num_poses, self._given_anchor)
+        graph.topology.require_connected(anchor=anchor, names=graph.ids)
+        self._refuse_dense_spectrum(graph.num_poses)
+        if self._bounds == "paper":
             require_equal_noise(fisher_rows(graph))
-        self._bounds = bounds
-        self._choices = (graph, objective, signature, normalized)
-        self._determinant, self._anchor = determinant, anchor
+        self._graph, self._anchor = graph, anchor
 
     @property
     def graph(self) -> PoseGraph:
         """The prior."""
         return self._graph
+
+    def extend(self, graph: PoseGraph) -> Planner:
+        """Plan on a graph that has grown: the chosen path was driven, or new measurements came in.
+
+        What the planner factored is taken over where it can be (docs, the mathematics, section 8): orders of elimination, and
+        those parts of each factor below which nothing has changed. Topological ones survive a new estimate; those of the
+        information matrix where poses have not moved.
+
+        Parameters
+        ----------
+        graph
+            Its first poses and edges are those of the graph as it was, at any poses. Other graphs are valid, and start anew.
+            Unless an anchor was given, the new last pose is held.
+
+        Returns
+        -------
+        Planner
+            This one.
+
+        Raises
+        ------
+        InvalidInputError, DisconnectedGraphError, InvalidGraphError
+            As for the planner; it then still plans on the graph as it was.
+
+        Examples
+        --------
+        >>> prior = PoseGraph([[0, 0, 0], [1, 0, 0]], [(0, 1)], None, np.eye(3) * 100)
+        >>> planner = Planner(prior)
+        >>> ahead = Action([[2, 0, 0]], [(1, 2)], np.eye(3) * 100)
+        >>> planner.extend(posterior(prior, ahead)).graph.num_poses
+        3
+        """
+        before = self._graph
+        self._take(graph)
+        self._scratch = None
+        if self._incremental is not None:
+            grown = graph.group is before.group and graph.num_poses >= before.num_poses
+            self._incremental = self._incremental.extended(graph, self._anchor) if grown else None
+        return self
 
     def decide(
         self,
@@ -210,20 +255,17 @@ class Planner:
     def _evaluation_of(self, num_actions: int) -> Evaluation:
         """From scratch, or by increments where that is worth the compiled kernels' time to load."""
         worthwhile = num_actions * self._graph.num_edges >= _INCREMENTAL_WORK and _has_kernels()
-        if worthwhile or self._bounds == "anchored":
-            return self._incremental.for_one_decision() if self._bounds == "auto" else self._incremental
-        return self._scratch
+        if not (worthwhile or self._bounds == "anchored"):
+            if self._scratch is None:
+                family = "fischer" if self._bounds == "auto" else self._bounds
+                self._scratch = ScratchEvaluation(self._graph, *self._choices, family, self._determinant, self._anchor)
+            return self._scratch
+        if self._incremental is None:
+            from topobelief.planning.incremental import IncrementalEvaluation  # loads numba
 
-    @cached_property
-    def _scratch(self) -> ScratchEvaluation:
-        family = "fischer" if self._bounds == "auto" else self._bounds
-        return ScratchEvaluation(*self._choices, family, self._determinant, self._anchor)
-
-    @cached_property
-    def _incremental(self) -> IncrementalEvaluation:
-        from topobelief.planning.incremental import IncrementalEvaluation  # loads numba
-
-        return IncrementalEvaluation(*self._choices, self._bounds, self._determinant, self._anchor)
+            choices = *self._choices, self._bounds, self._determinant
+            self._incremental = IncrementalEvaluation(self._graph, *choices, self._anchor)
+        return self._incremental.for_one_decision() if self._bounds == "auto" else self._incremental
 
     def _refuse_dense_spectrum(self, num_poses: int) -> None:
         if num_poses > self._largest_spectrum:

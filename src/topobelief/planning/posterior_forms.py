@@ -15,7 +15,7 @@ from topobelief.graph.fisher import FisherRows, fisher_rows
 from topobelief.graph.information import SAME_NOISE
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg import EdgeForm, LogDet, LogDetSolver, laplacian_form
-from topobelief.linalg.elimination_paths import EliminationTree, FormFactor
+from topobelief.linalg.elimination_paths import EliminationTree, FormFactor, KnownColumns, changed_nodes
 from topobelief.linalg.increments import Increments, diagonal_increments, log_det_increments
 from topobelief.linalg.log_det import UNIT_ROUNDOFF
 from topobelief.planning.action_batch import ActionBatch, scalar_weights_of
@@ -24,6 +24,7 @@ FormName = Literal["trees_p", "trees_r", "positions", "rotations", "rotations_gi
 """Laplacians with the weights w_p and w_r; I_pp, I_rr, L_r|p and I in blocks."""
 
 _HOLD_STRONGEST_ERROR = 1e-6  # nats; below it one more factorisation would not be seen
+_APPENDED_SHARE = 0.2  # of the longest path: poses that may follow an old order before a new one pays
 _LARGEST_ERROR = 1.0  # nats; a factor that knows less is none
 _QR_SIZE = 1200  # up to here an evaluation from scratch may do better, by QR, than an untrustworthy factor
 _QR_RELATIVE_ERROR = 1e-8
@@ -103,12 +104,19 @@ class PriorForms:
         The prior.
     anchor
         The pose that all forms hold.
+    earlier
+        Those of the graph before it grew, whose orders are kept and from whose factors columns that are still right are copied.
+        They are used up by that.
     """
 
-    def __init__(self, graph: PoseGraph, anchor: int) -> None:
+    def __init__(self, graph: PoseGraph, anchor: int, *, earlier: PriorForms | None = None) -> None:
         self.graph, self.anchor = graph, anchor
         self._trees: dict[int, EliminationTree] = {}
+        self._bases: dict[int, EliminationTree] = {}  # of the trees that keep an order
         self._factors: dict[tuple[FormName, float], FormFactor] = {}
+        self._earlier = earlier
+        if earlier is not None:
+            earlier._earlier = None
 
     @property
     def edges(self) -> IntArray:
@@ -137,21 +145,38 @@ class PriorForms:
         Where it does not matter which pose is held but rounding does, the one with the strongest rows is, if that is better.
         """
         if (name, shift) not in self._factors:
-            form = form_of(name, self)
-            factor = FormFactor.of(self._tree(self.anchor), form, shift=shift)
-            if not (factor.log_det.error <= _HOLD_STRONGEST_ERROR or name == "rotations" or shift):
-                strongest = FormFactor.of(self._tree(form.strongest_node()), form)
-                factor = min(factor, strongest, key=lambda candidate: candidate.log_det.error)
+            form, invariant = form_of(name, self), not (name == "rotations" or shift)
+            old = None if self._earlier is None else self._earlier._factors.pop((name, shift), None)
+            held = self.anchor if old is None or not invariant else old.tree.held
+            tree = self._tree(held, None if old is None else old.tree)
+            factor = FormFactor.of(tree, form, shift=shift, known=self._known_columns(name, form, old, held))
+            strongest = form.strongest_node()
+            if invariant and not factor.log_det.error <= _HOLD_STRONGEST_ERROR and strongest != held:
+                best_held = FormFactor.of(self._tree(strongest), form)
+                factor = min(factor, best_held, key=lambda candidate: candidate.log_det.error)
             self._factors[name, shift] = factor
         return self._factors[name, shift]
+
+    def _known_columns(self, name: FormName, form: EdgeForm, old: FormFactor | None, held: int) -> KnownColumns | None:
+        if old is None or self._earlier is None or self._bases.get(held) is not old.tree:
+            return None
+        changed = changed_nodes(form_of(name, self._earlier), form, self.graph.num_poses, (old.tree.held, held))
+        return KnownColumns(old, changed)
 
     def hadamard(self, name: FormName, shift: float) -> LogDet:
         """Sum of ln det of the diagonal blocks."""
         return self._diagonal_solver.hadamard(form_of(name, self), shift=shift)
 
-    def _tree(self, held: int) -> EliminationTree:
+    def _tree(self, held: int, base: EliminationTree | None = None) -> EliminationTree:
+        """The tree with this pose held, in the order of a `base` of the graph as it was unless that has grown too much."""
         if held not in self._trees:
-            self._trees[held] = EliminationTree.build(self.graph.edges, self.graph.num_poses, held)
+            edges, num_nodes = self.graph.edges, self.graph.num_poses
+            tree = None if base is None else base.adapted(edges, num_nodes, held)
+            if base is None or tree is None or tree.num_appended > _APPENDED_SHARE * tree.longest_path:
+                tree = EliminationTree.build(edges, num_nodes, held)
+            else:
+                self._bases[held] = base
+            self._trees[held] = tree
         return self._trees[held]
 
     @cached_property
