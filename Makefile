@@ -33,6 +33,7 @@ check: install
 
 bench: install
 	$(BIN)/python benchmarks/first_answers.py
+	$(BIN)/python -m pytest -o addopts= -q benchmarks/kernels.py --benchmark-columns=min,median,max --benchmark-sort=name
 
 clean:
 	rm -rf .venv out dist build

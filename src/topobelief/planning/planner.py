@@ -131,7 +131,7 @@ class Planner:
     def extend(self, graph: PoseGraph) -> Planner:
         """Plan on a graph that has grown: the chosen path was driven, or new measurements came in.
 
-        What the planner factored is taken over where it can be (docs, the mathematics, section 8): orders of elimination, and
+        What the planner factored is taken over where it can be (docs, the mathematics, section 7): orders of elimination, and
         those parts of each factor below which nothing has changed. Topological ones survive a new estimate; those of the
         information matrix where poses have not moved.
 
