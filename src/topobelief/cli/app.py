@@ -8,8 +8,10 @@ from typing import Annotated, cast
 
 import typer
 
+from topobelief.cli.benchmark import benchmark
 from topobelief.cli.info import info
 from topobelief.cli.plan import plan
+from topobelief.cli.study import study, study_report
 from topobelief.errors import TopobeliefError
 
 BAD_INPUT = 2
@@ -21,6 +23,9 @@ _UsageError = cast("type[Exception]", typer.BadParameter.__mro__[1])
 app = typer.Typer(name="topobelief", add_completion=False, pretty_exceptions_enable=False)
 app.command()(plan)
 app.command()(info)
+app.command()(benchmark)
+app.command()(study)
+app.command()(study_report)
 
 
 @app.callback(invoke_without_command=True)

@@ -11,7 +11,7 @@ import typer
 # The planner's own choices, repeated so that help need not load it; a test holds them together.
 Objective = Literal["joint", "map", "per_pose"]
 Signature = Literal["spanning_trees", "von_neumann", "von_neumann_approx"]
-Family = Literal["paper", "fischer", "anchored"]
+Family = Literal["paper", "fischer", "anchored", "auto"]
 Determinant = Literal["cholesky", "hadamard"]
 Proof = Literal["none", "bounded", "optimal"]
 Unknown = Literal["occupied", "free"]
@@ -152,7 +152,8 @@ def plan(
     bounds: Annotated[
         Family,
         typer.Option(
-            help="Family of bounds; the paper's needs equal noise, the anchored one numba.", rich_help_panel=_DECISION
+            help="Family of bounds; the paper's needs equal noise, the anchored one numba; auto takes what proves for less.",
+            rich_help_panel=_DECISION,
         ),
     ] = "fischer",
     determinant: Annotated[

@@ -1,0 +1,109 @@
+"""`topobelief study`: a grid of decisions, played on the cores of this machine or on a cluster; `study-report` draws them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from topobelief.experiments.study.attempt import Workers
+
+
+def study(
+    specification_file: Annotated[Path, typer.Argument(metavar="SPEC", help="What to vary, .yaml.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER", help="For the rows; a study that is there continues.", show_default="out/ and the name of SPEC"
+        ),
+    ] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes of this machine.", show_default="one a core")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="A dask.distributed cluster, such as tcp://10.0.0.1:8786.")
+    ] = None,
+    retry_failed: Annotated[
+        bool, typer.Option("--retry-failed", help="Play again the tasks that failed in an earlier run.")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the outcome as JSON and nothing else.")] = False,
+) -> None:
+    """Run a grid of worlds, sessions, noises, strategies, objectives and seeds.
+
+    Each task's row lands whole in a Parquet dataset. Killed at any moment, the same command continues and repeats nothing.
+    """
+    if workers is not None and scheduler is not None:
+        raise typer.BadParameter("expected one of --workers and --scheduler, got both.", param_hint="who plays")
+    from topobelief.cli.console import Reporter
+
+    reporter = Reporter(as_json=as_json)
+    with reporter.stage("start-up"):
+        from topobelief.cli.plan_files import checked_folder
+        from topobelief.cli.study_progress import StudyProgress
+        from topobelief.experiments.study.runner import run_study
+        from topobelief.experiments.study.specification import read_specification
+        from topobelief.experiments.study.tasks import tasks_of
+
+    folder = out or Path("out") / specification_file.stem
+    checked_folder(folder)
+    with reporter.stage("reading"):
+        tasks = tasks_of(read_specification(specification_file))
+    with StudyProgress() as progress:
+        outcome = run_study(tasks, folder, _workers(workers, scheduler), retry_failed=retry_failed, on_progress=progress.update)
+    earlier = outcome.num_tasks - outcome.num_played
+    reporter.say(
+        f"{folder}: {outcome.num_tasks} tasks, {outcome.num_played} of them now"
+        + (f", {earlier} in earlier runs" if earlier else "")
+    )
+    if outcome.num_failed:
+        first = f"; the first one now: {outcome.first_error}" if outcome.first_error else ""
+        reporter.say(f"{outcome.num_failed} failed, see the column error{first}")
+    reporter.say(f"Rows: {folder / 'rows'} (Parquet); table and pictures: topobelief study-report {folder}")
+    reporter.answer(
+        {
+            "folder": str(folder),
+            "num_tasks": outcome.num_tasks,
+            "num_played": outcome.num_played,
+            "num_failed": outcome.num_failed,
+            "first_error": outcome.first_error,
+        }
+    )
+
+
+def _workers(num_workers: int | None, scheduler: str | None) -> Workers:
+    if scheduler is not None:
+        from topobelief.experiments.study.cluster import Cluster
+
+        return Cluster(scheduler)
+    from topobelief.experiments.study.local_workers import LocalWorkers
+
+    return LocalWorkers(num_workers)
+
+
+def study_report(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="What `topobelief study` wrote, finished or not.")],
+    out: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="For the pictures and summary.csv.", show_default="FOLDER/report")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON and nothing else.")] = False,
+) -> None:
+    """Draw what a study found: what each strategy loses, how it ranks, how long it takes."""
+    from topobelief.cli.console import Reporter
+
+    reporter = Reporter(as_json=as_json)
+    with reporter.stage("start-up"):
+        from topobelief.cli import study_files
+        from topobelief.cli.plan_files import checked_folder
+        from topobelief.experiments.study.dataset import read_table
+        from topobelief.experiments.study.summary import summaries
+        from topobelief.report.study_tables import summary_table
+
+    target = out or folder / "report"
+    with reporter.stage("reading"):
+        found = summaries(read_table(folder))
+    checked_folder(target)
+    reporter.say(summary_table(found))
+    with reporter.stage("pictures"):
+        names = study_files.write(target, found)
+    reporter.say(f"{target}: {', '.join(names)}")
+    reporter.answer(study_files.document(found))

@@ -1,0 +1,246 @@
+"""What a study varies: worlds, sessions, noises, strategies, objectives and seeds, read from a YAML file.
+
+Every combination is a task. A session runs in all worlds unless it names its own; paths are relative to the YAML file.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar, cast, get_args
+
+import numpy as np
+
+from topobelief.arrays import FloatArray
+from topobelief.bounds.entropy_bounds import Determinant
+from topobelief.errors import FileError
+from topobelief.estimation import optimize
+from topobelief.experiments.study.fields import Field, read_fields
+from topobelief.experiments.study.strategies import STRATEGIES
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.io.files import StrPath
+from topobelief.io.floor_plan import read_world
+from topobelief.io.formats import read_pose_graph
+from topobelief.io.ros_map import Unknown
+from topobelief.planning.objectives import ObjectiveName
+from topobelief.planning.planner import BoundsName
+from topobelief.world import World
+
+_Entry = TypeVar("_Entry")
+_NO_LIMIT = ("none", "inf", ".inf")
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """Standard deviations of a relative measurement, metres and radians."""
+
+    sigma_p: float
+    sigma_theta: float
+
+    @property
+    def xi(self) -> float:
+        """ξ = σ_θ/σ_p of the paper."""
+        return self.sigma_theta / self.sigma_p
+
+    @property
+    def information(self) -> FloatArray:
+        """Shape (3, 3)."""
+        return np.diag([self.sigma_p**-2, self.sigma_p**-2, self.sigma_theta**-2])
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """How candidates are found, their factors predicted and their entropies bounded; as `topobelief plan` has them."""
+
+    num_vertices: int = 1000
+    robot_radius: float = 0.35  # metres
+    max_detour: float = 1.3  # in lengths of the shortest path; inf for no limit
+    spacing: float = 1.0  # metres
+    closure_radius: float = 2.0  # metres
+    closure_angle: float = math.pi
+    min_index_gap: int = 5
+    line_of_sight: bool = True
+    bounds: BoundsName = "fischer"
+    determinant: Determinant = "cholesky"
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Session:
+    """A drive from goal to goal; the decision on the way to the last one is the one that is studied.
+
+    Attributes
+    ----------
+    name
+    graph : PoseGraph
+        What the robot knows at the start: one pose, or a recorded graph at its maximum-likelihood estimate.
+    goals : tuple of (x, y)
+        Metres.
+    num_paths : tuple of int
+        Candidates, goal by goal.
+    """
+
+    name: str
+    graph: PoseGraph
+    goals: tuple[tuple[float, float], ...]
+    num_paths: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Specification:
+    """A study.
+
+    Attributes
+    ----------
+    worlds
+        By name.
+    sessions
+        Each with the names of the worlds that it runs in.
+    noises, strategies, objectives, seeds, rule
+    """
+
+    worlds: dict[str, World]
+    sessions: tuple[tuple[Session, tuple[str, ...]], ...]
+    noises: tuple[Noise, ...]
+    strategies: tuple[str, ...]
+    objectives: tuple[ObjectiveName, ...]
+    seeds: tuple[int, ...]
+    rule: Rule
+
+
+def read_specification(path: StrPath) -> Specification:
+    """The study that a YAML file describes, with its worlds and graphs read.
+
+    Raises
+    ------
+    FileError
+        Names the file, the line and the field; or the map or graph that is wrong.
+    """
+    folder = Path(path).parent
+    fields = read_fields(path).mapping(
+        required=("worlds", "sessions", "noises", "strategies", "seeds"), optional=("objectives", "rule")
+    )
+    worlds = {name: _world(field, folder) for name, field in fields["worlds"].entries().items()}
+    sessions = tuple(_session(name, field, folder, worlds) for name, field in fields["sessions"].entries().items())
+    objectives = ("joint",)
+    if "objectives" in fields:
+        objectives = _several(fields["objectives"], lambda item: item.choice(get_args(ObjectiveName)))
+    return Specification(
+        worlds=worlds,
+        sessions=sessions,
+        noises=_several(fields["noises"], _noise),
+        strategies=_several(fields["strategies"], lambda item: item.choice(STRATEGIES)),
+        objectives=cast("tuple[ObjectiveName, ...]", objectives),
+        seeds=_seeds(fields["seeds"]),
+        rule=_rule(fields["rule"]) if "rule" in fields else Rule(),
+    )
+
+
+def _several(field: Field, read: Callable[[Field], _Entry]) -> tuple[_Entry, ...]:
+    """The entries of a list, all different."""
+    found: list[_Entry] = []
+    for item in field.items():
+        entry = read(item)
+        if entry in found:
+            item.refuse("entries that differ", "one that stood before")
+        found.append(entry)
+    return tuple(found)
+
+
+def _world(field: Field, folder: Path) -> World:
+    unknown: Unknown = "occupied"
+    source = field
+    if field.is_mapping():
+        keys = field.mapping(required=("map",), optional=("unknown",))
+        source = keys["map"]
+        if "unknown" in keys:
+            unknown = cast("Unknown", keys["unknown"].choice(get_args(Unknown)))
+    return read_world(_existing(source, folder, "the path of a map (.yaml or .csv)"), unknown=unknown)
+
+
+def _existing(field: Field, folder: Path, expected: str) -> Path:
+    path = folder / field.text(expected=expected)
+    if not path.is_file():
+        field.refuse(expected, f"{str(path)!r}, which is no file")
+    return path
+
+
+def _session(name: str, field: Field, folder: Path, worlds: dict[str, World]) -> tuple[Session, tuple[str, ...]]:
+    keys = field.mapping(required=("goals",), optional=("start", "graph", "candidates", "worlds"))
+    if ("start" in keys) == ("graph" in keys):
+        field.refuse("one of the keys 'start' and 'graph'", "both" if "start" in keys else "none")
+    graph = _at(keys["start"]) if "start" in keys else _recorded(keys["graph"], folder)
+    goals = tuple(_place(item) for item in keys["goals"].items(expected="a list of goals [x, y]"))
+    names = tuple(worlds)
+    if "worlds" in keys:
+        names = _several(keys["worlds"], lambda item: item.choice(tuple(worlds)))
+    return Session(name, graph, goals, _num_paths(keys.get("candidates"), len(goals))), names
+
+
+def _at(field: Field) -> PoseGraph:
+    """A robot that knows nothing but where it is."""
+    pose = field.numbers(2, 3, expected="a start [x, y] or [x, y, theta]")
+    no_edges = np.zeros((0, 2), dtype=np.int64)
+    return PoseGraph([[*pose[:2], pose[2] if len(pose) == 3 else 0.0]], no_edges, None, np.eye(3))
+
+
+def _recorded(field: Field, folder: Path) -> PoseGraph:
+    path = _existing(field, folder, "the path of a pose graph (.g2o or .toro)")
+    graph = read_pose_graph(path)
+    if graph.group.position_dim != 2:
+        raise FileError(path, f"expected a graph in SE(2) to plan in the plane, got one in {graph.group.name}")
+    return optimize(graph)
+
+
+def _place(field: Field) -> tuple[float, float]:
+    x, y = field.numbers(2, expected="a goal [x, y]")
+    return x, y
+
+
+def _num_paths(field: Field | None, num_goals: int) -> tuple[int, ...]:
+    if field is None:
+        return (20,) * num_goals
+    if not field.is_list():
+        return (field.whole(at_least=1),) * num_goals
+    counts = tuple(item.whole(at_least=1) for item in field.items())
+    if len(counts) != num_goals:
+        field.refuse(f"one number, or one for each of the {num_goals} goals")
+    return counts
+
+
+def _noise(field: Field) -> Noise:
+    keys = field.mapping(required=("sigma_p", "sigma_theta"))
+    return Noise(keys["sigma_p"].number(above=0), keys["sigma_theta"].number(above=0))
+
+
+def _seeds(field: Field) -> tuple[int, ...]:
+    """How many, from 0 on, or which."""
+    if field.is_list():
+        return _several(field, lambda item: item.whole(at_least=0))
+    return tuple(range(field.whole(at_least=1)))
+
+
+def _rule(field: Field) -> Rule:
+    keys = field.mapping(optional=Rule.__dataclass_fields__)
+    readers: dict[str, Callable[[Field], object]] = {
+        "num_vertices": lambda item: item.whole(at_least=2),
+        "robot_radius": lambda item: item.number(above=0),
+        "max_detour": _detour,
+        "spacing": lambda item: item.number(above=0),
+        "closure_radius": lambda item: item.number(above=0),
+        "closure_angle": lambda item: item.number(above=0, at_most=math.pi),
+        "min_index_gap": lambda item: item.whole(at_least=2),
+        "line_of_sight": Field.flag,
+        "bounds": lambda item: item.choice(get_args(BoundsName)),
+        "determinant": lambda item: item.choice(get_args(Determinant)),
+    }
+    values = {key: readers[key](child) for key, child in keys.items()}
+    return Rule(**values)  # pyright: ignore[reportArgumentType]  (each reader gives its field's type)
+
+
+def _detour(field: Field) -> float:
+    expected = "a number of at least 1, or none for no limit"
+    if field.text(expected=expected).lower() in _NO_LIMIT:
+        return math.inf
+    return field.number(at_least=1)
