@@ -13,7 +13,7 @@ O_r|p = O_rr - O_rp O_pp^-1 O_pr (docs, the mathematics, section 4).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -60,17 +60,15 @@ class FisherRows:
         magnitude = np.repeat(self.row_scale[:, :1], k, 1)
         return EdgeForm(self.edges, -root, root, magnitude, magnitude, self.root_error)
 
+    @_may_overflow
     def rotations(self) -> EdgeForm:
         """I_rr: the rotations with all positions held; with equal noise w_r (L + xi^2 D)."""
         k, q = self.group.position_dim, self.group.rotation_dim
-        joint = self.joint()
-        return replace(
-            joint,
-            rows_i=joint.rows_i[:, :, k:],
-            rows_j=joint.rows_j[:, :, k:],
-            magnitude_i=joint.magnitude_i[:, k:].reshape(-1, q),
-            magnitude_j=joint.magnitude_j[:, k:].reshape(-1, q),
-        )
+        rows_j = self.root[:, :, k:]
+        rows_i = self.root[:, :, :k] @ self.lever - rows_j
+        magnitude_j = np.repeat(self.row_scale[:, 1:], q, 1)
+        magnitude_i = magnitude_j + (self.row_scale[:, 0] * np.sqrt(self.squared_lengths()))[:, None]
+        return EdgeForm(self.edges, rows_i, rows_j, magnitude_i, magnitude_j, self.root_error)
 
     def rotations_given_positions(self) -> EdgeForm:
         """L_r|p: the Laplacian with weights O_r|p; scalar, w_r L, where the noise allows."""

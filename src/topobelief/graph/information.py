@@ -95,8 +95,16 @@ def shared_information(information: FloatArray) -> FloatArray | None:
     return first if same else None
 
 
+def _repeats_one(information: FloatArray) -> bool:
+    """Whether several edges have the very same matrix."""
+    return len(information) > 1 and bool(information.strides[0] == 0 or (information == information[0]).all())
+
+
 def isotropic_weights(information: FloatArray) -> tuple[FloatArray, FloatArray] | None:
     """(w_p, w_r), each of shape (num_edges,), where every Omega is blkdiag(w_p I_k, w_r I_q); None elsewhere."""
+    if _repeats_one(information):
+        shared = isotropic_weights(information[:1])
+        return shared and (np.broadcast_to(shared[0], len(information)), np.broadcast_to(shared[1], len(information)))
     k, q = tangent_split(information.shape[-1])
     w_p, w_r = information[:, 0, 0], information[:, k, k]
     block = np.zeros(information.shape[1:])
@@ -122,6 +130,9 @@ def rotation_information_given_position(information: FloatArray) -> FloatArray:
 
 def scalar_weights(information: FloatArray) -> tuple[FloatArray, FloatArray]:
     """w_p = |O_pp|^(1/k) and w_r = |O_r|p|^(1/q), each of shape (num_edges,): noise as one number per part."""
+    if _repeats_one(information):
+        w_p, w_r = scalar_weights(information[:1])
+        return np.broadcast_to(w_p, len(information)), np.broadcast_to(w_r, len(information))
     k, q = tangent_split(information.shape[-1])
     log_det_p = np.linalg.slogdet(information[:, :k, :k])[1]
     log_det_r = np.linalg.slogdet(rotation_information_given_position(information))[1]

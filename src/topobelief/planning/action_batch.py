@@ -113,7 +113,4 @@ class ActionBatch:
 
 def scalar_weights_of(information: FloatArray) -> tuple[FloatArray, FloatArray]:
     """(w_p, w_r) of edges, as spanning-tree signatures take them; block-isotropic noise has its own."""
-    if len(information) > 1 and (information.strides[0] == 0 or (information == information[0]).all()):
-        w_p, w_r = scalar_weights_of(information[:1])
-        return np.broadcast_to(w_p, len(information)), np.broadcast_to(w_r, len(information))
     return isotropic_weights(information) or scalar_weights(information)

@@ -26,13 +26,18 @@ def compile_kernels() -> None:
     for group in (SE2_GROUP, SE3_GROUP):
         for coupling in (0.0, 0.1):
             graph, action = _ring(group, coupling)
+            grown = posterior(graph, action)
+            revisit = Action(grown.poses[:0], action.edges[:1], action.information[0])
             for signature, family, determinant in _CHOICES:
                 evaluation = IncrementalEvaluation(graph, "map", signature, False, family, determinant, 0)
-                evaluation.signatures([action])
-                evaluation.bounds([action])
-                evaluation.entropies([action])
-            grown = posterior(graph, action)
-            evaluation.extended(grown, 0).entropies([Action(grown.poses[:0], action.edges[:1], action.information[0])])
+                _evaluate(evaluation, action)
+                _evaluate(evaluation.extended(grown, 0), revisit)
+
+
+def _evaluate(evaluation: IncrementalEvaluation, action: Action) -> None:
+    evaluation.signatures([action])
+    evaluation.bounds([action])
+    evaluation.entropies([action])
 
 
 def _ring(group: Group, coupling: float, *, num_poses: int = 70) -> tuple[PoseGraph, Action]:
