@@ -47,7 +47,7 @@ def test_the_code_in_the_readme_runs(monkeypatch, capsys):
     assert decision.summary() in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/README.md", "examples/office/README.md"])
+@pytest.mark.parametrize("page", ["README.md", "docs/README.md", "examples/office/README.md", "examples/study/README.md"])
 def test_links_lead_somewhere(page):
     text = (ROOT / page).read_text(encoding="utf-8")
     for target in re.findall(r"\]\(([^)#]+?)(?:#[^)]*)?\)", text):

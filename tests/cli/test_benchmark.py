@@ -34,6 +34,12 @@ def test_a_benchmark_prints_tables_and_writes_its_numbers(tiny, tmp_path, capsys
     assert [path.name for path in (tmp_path / "new").iterdir()] == ["benchmark.json"]
 
 
+def test_two_sizes_make_a_picture(tiny, tmp_path, capsys):
+    assert run(["benchmark", "--quick", "--sizes", "20,30", "--out", str(tmp_path)]) == 0
+    assert (tmp_path / "benchmark.png").stat().st_size > 20_000
+    assert "benchmark.png" in capsys.readouterr().out
+
+
 def test_options_go_before_the_quick_plan_and_json_is_all_that_is_printed(tiny, capsys):
     assert run(["benchmark", "--quick", "--sizes", "25,35", "--candidates", "2", "--seed", "3", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)

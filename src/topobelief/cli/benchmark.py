@@ -16,21 +16,24 @@ def benchmark(
         typer.Argument(metavar="[GRAPH]...", help="Pose graphs to measure beside generated ones, .g2o or .toro."),
     ] = None,
     sizes: Annotated[
-        str | None, typer.Option(help="Poses of the generated graphs, by commas.  [default: 1000,3500,10000,100000]")
+        str | None, typer.Option(help="Poses of the generated graphs, by commas; 1000,3500,10000,100000 if not given.")
     ] = None,
-    candidates: Annotated[int | None, typer.Option(help="Actions of a session.  [default: 1000]", min=2)] = None,
-    repeat: Annotated[int | None, typer.Option(help="Repetitions of each timing.  [default: 5]", min=1)] = None,
+    candidates: Annotated[int | None, typer.Option(help="Actions of a session; 1000 if not given.", min=2)] = None,
+    repeat: Annotated[int | None, typer.Option(help="Repetitions of each timing; 5 if not given.", min=1)] = None,
     seed: Annotated[int, typer.Option(help="Of generated graphs and of candidates.", min=0)] = 0,
     quick: Annotated[
         bool, typer.Option("--quick", help="A small graph and few candidates, for a first look: about a minute.")
     ] = False,
-    out: Annotated[Path | None, typer.Option(help="Folder for benchmark.json.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for benchmark.json, and for a picture if there are two sizes.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")] = False,
 ) -> None:
     """Time this engine beside GTSAM, sparse factorisations from scratch and the determinant lemma.
 
-    Ratios come first: all of a session's actions, set-up included. Memory, error bounds and proofs follow. Other work on the
-    machine distorts the figures. Needs the extras fast and gtsam.
+    Ratios come first: all of a session's actions, set-up included. Memory, error bounds and proofs follow.
+
+    Other work on the machine distorts the figures. Needs the extras fast and gtsam.
     """
     from topobelief.cli.console import Reporter
     from topobelief.cli.plan_files import checked_folder
@@ -40,7 +43,9 @@ def benchmark(
         from topobelief.errors import FileError
         from topobelief.experiments.benchmark.run import BenchmarkPlan, BenchmarkResult, require_packages, run_benchmark
         from topobelief.io.files import atomic_file
+        from topobelief.report.benchmark_figure import draw_benchmark
         from topobelief.report.benchmark_tables import benchmark_tables
+        from topobelief.report.canvas import save_figure
 
         require_packages()
     for path in graph_files or ():
@@ -65,8 +70,13 @@ def benchmark(
     if result is not None:
         reporter.say(*benchmark_tables(result))
         reporter.answer(result.to_dict())
-    if folder is not None:
+    if folder is not None and result is not None:
         reporter.say(f"All numbers: {folder / 'benchmark.json'}")
+        figure = draw_benchmark(result)
+        if figure is not None:
+            with atomic_file(folder / "benchmark.png") as path:
+                save_figure(figure, path)
+            reporter.say(f"Time against size: {folder / 'benchmark.png'}")
 
 
 def parse_sizes(text: str) -> tuple[int, ...]:
