@@ -17,16 +17,18 @@ from typing import Literal, cast
 
 import numpy as np
 import yaml
+from numpy.typing import ArrayLike
 from PIL import Image
 
 from topobelief.arrays import BoolArray, FloatArray
 from topobelief.errors import FileError, InvalidInputError, InvalidMapError
-from topobelief.io.files import StrPath, read_text
+from topobelief.io.files import StrPath, atomic_file, read_text, write_text
 from topobelief.world import World
 
 Unknown = Literal["occupied", "free"]
 
 _MODES = ("trinary", "scale", "raw")
+_OCCUPIED_COLOUR, _UNKNOWN_COLOUR, _FREE_COLOUR = 0, 205, 254  # of map_saver
 
 
 def read_ros_map(path: StrPath, *, unknown: Unknown = "occupied") -> World:
@@ -53,6 +55,50 @@ def read_ros_map(path: StrPath, *, unknown: Unknown = "occupied") -> World:
         return World.from_cells(free[::-1], header.resolution, header.origin)  # images start at the top
     except InvalidMapError as error:
         raise FileError(path, str(error)) from None
+
+
+def write_ros_map(
+    path: StrPath, occupancy: ArrayLike, *, resolution: float, origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+) -> None:
+    """Write an occupancy grid as map_saver does: a YAML file, and a PGM image of the same name beside it.
+
+    Parameters
+    ----------
+    path
+        The YAML file.
+    occupancy : shape (rows, columns)
+        0 free, 100 occupied, -1 unknown, as in nav_msgs/OccupancyGrid; row 0 is the lowest in y.
+    resolution
+        Side of a cell, metres.
+    origin : (x, y, yaw)
+        Pose of the lower left corner of cell (0, 0).
+
+    Raises
+    ------
+    InvalidInputError
+        For another shape, other values, or a resolution that is not positive.
+    FileError
+        Where a file cannot be written.
+    """
+    cells = np.asarray(occupancy)
+    if cells.ndim != 2 or cells.size == 0 or not np.isin(cells, (-1, 0, 100)).all():
+        raise InvalidInputError(f"expected cells of -1, 0 and 100, shape (rows, columns), got {cells.dtype} of {cells.shape}")
+    if not (math.isfinite(resolution) and resolution > 0):
+        raise InvalidInputError(f"expected a resolution above 0 m, got {resolution}")
+    colour = np.select([cells == 100, cells == 0], [_OCCUPIED_COLOUR, _FREE_COLOUR], _UNKNOWN_COLOUR).astype(np.uint8)
+    image = Path(path).with_suffix(".pgm")
+    with atomic_file(image) as temporary:
+        Image.fromarray(colour[::-1]).save(temporary)  # images start at the top
+    header: dict[str, object] = {
+        "image": image.name,
+        "mode": "trinary",
+        "resolution": float(resolution),
+        "origin": [float(number) for number in origin],
+        "negate": 0,
+        "occupied_thresh": 0.65,
+        "free_thresh": 0.196,
+    }
+    write_text(path, yaml.safe_dump(header, sort_keys=False))
 
 
 @dataclass(frozen=True, slots=True)

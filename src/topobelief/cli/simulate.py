@@ -1,0 +1,170 @@
+"""`topobelief simulate`: a robot, a laser, walls, and decisions that show in the map; `simulate-compare` compares them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+# The planner's own choices, repeated so that help need not load it; a test holds them together.
+Objective = Literal["joint", "map", "per_pose"]
+
+_SCENARIO_HELP = "office, lab, corridors, or a .yaml of your own."
+_NOISE_HELP = 'physical; or injected: the ratio ξ = σ_θ/σ_p at σ_p = 0.1 m, such as 0.35, or "σ_p,σ_θ" in m and rad.'
+
+
+def simulate(
+    scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help=_SCENARIO_HELP)],
+    strategy: Annotated[
+        str,
+        typer.Option(
+            help="spanning_trees, von_neumann_approx, von_neumann, optimum (proven), standard (all exact), shortest, random, "
+            "or path-k, the k-th shortest."
+        ),
+    ] = "spanning_trees",
+    objective: Annotated[
+        Objective, typer.Option(help="Entropy to minimise: of all poses (the paper's), of those that exist now, or per pose.")
+    ] = "joint",
+    seed: Annotated[int, typer.Option(min=0, help="The same seed, the same run.")] = 0,
+    noise: Annotated[str, typer.Option(help=_NOISE_HELP)] = "physical",
+    unknown: Annotated[bool, typer.Option("--unknown", help="Start with an empty map in place of the floor plan.")] = False,
+    max_detour: Annotated[
+        float | None,
+        typer.Option(
+            metavar="FACTOR",
+            help="Longest path, in lengths of the shortest; 0 for no limit.",
+            show_default="the scenario's",
+            min=0,
+        ),
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue the run in --out from its last key pose.")] = False,
+    displaced: Annotated[
+        float, typer.Option(help="With --resume: how far the robot stands ahead of where it believes to be, metres.")
+    ] = 0.0,
+    pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Draw the run and its decisions.")] = True,
+    recording: Annotated[bool, typer.Option("--recording", help="Write run.mcap, which Foxglove opens (extra view).")] = False,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="For all results.", show_default="out/ and the scenario's name")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print run.json and nothing else.")] = False,
+) -> None:
+    """Drive a robot through a scenario: at each goal it plans on its graph and map, decides, and drives.
+
+    Ctrl-C leaves a complete result of what was driven, from which --resume continues.
+    """
+    from topobelief.cli.console import Reporter
+
+    reporter = Reporter(as_json=as_json)
+    with reporter.stage("start-up"):
+        from topobelief.cli import simulation_files
+        from topobelief.cli.interruption import stop_on_interrupt
+        from topobelief.cli.plan_files import checked_folder
+        from topobelief.errors import InvalidInputError
+        from topobelief.experiments.scenario_file import scenario_of, with_detour
+        from topobelief.report.simulation_tables import leg_line, metrics_table
+        from topobelief.simulation.episode import Episode
+        from topobelief.simulation.noise import parse_noise
+        from topobelief.simulation.record import INTERRUPTED, RunOptions
+        from topobelief.simulation.results import read_history, run_document
+        from topobelief.simulation.strategies import checked_strategy
+
+        if displaced and not resume:
+            raise InvalidInputError("expected --displaced together with --resume, got it alone")
+        place = with_detour(scenario_of(scenario), max_detour)
+        options = RunOptions(
+            strategy=checked_strategy(strategy),
+            objective=objective,
+            seed=seed,
+            noise=parse_noise(noise),
+            unknown=unknown,
+        )
+        folder = out or Path("out") / place.name
+        checked_folder(folder)
+        simulation_files.require_recorder(recording)
+        history = read_history(folder, scenario=place.name, options=options) if resume else None
+    with reporter.stage("driving") as update, stop_on_interrupt() as should_stop:
+        files = simulation_files.RunFiles(folder, keep=resume)
+        episode = Episode(place, options, history=history, displaced=(displaced, 0.0, 0.0))
+        record = episode.run(
+            should_stop=should_stop,
+            on_progress=lambda what, done, total: update(round(done), round(total)),
+            on_leg=files.write,
+        )
+        files.write(record)
+    for leg in record.legs:
+        reporter.say(leg_line(leg))
+    reporter.say(metrics_table(record))
+    if pictures or recording:
+        with reporter.stage("pictures"):
+            files.draw(record, pictures=pictures, recording=recording)
+    reporter.say(f"{folder}: {', '.join(files.names)}", f"Took {reporter.time_taken()}")
+    reporter.answer(run_document(record))
+    if record.outcome == INTERRUPTED:
+        raise typer.Exit(130)
+
+
+def simulate_compare(
+    scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help=_SCENARIO_HELP)],
+    strategies: Annotated[str, typer.Option(help="By commas; the first is what the others are compared with.")] = (
+        "shortest,spanning_trees"
+    ),
+    objective: Annotated[Objective, typer.Option(help="As for simulate.")] = "joint",
+    seeds: Annotated[int, typer.Option(min=1, help="How many, from 0 on.")] = 20,
+    noise: Annotated[str, typer.Option(help="Injected, as for simulate; redrawn for each recorded graph.")] = "0.35",
+    redraws: Annotated[int, typer.Option(min=1, help="Of the noise, for each recorded graph.")] = 50,
+    max_detour: Annotated[
+        float | None,
+        typer.Option(
+            metavar="FACTOR",
+            help="Longest path, in lengths of the shortest; 0 for no limit.",
+            show_default="the scenario's",
+            min=0,
+        ),
+    ] = None,
+    workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="For all runs and the table; what is there is not driven again."),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the table as JSON and nothing else.")] = False,
+) -> None:
+    """Compare strategies on the last session of a scenario, on expectations: the noise of each graph is drawn many times.
+
+    All earlier sessions of a seed are driven once, so that the strategies decide on the same graph.
+    """
+    from topobelief.cli.console import Reporter
+
+    reporter = Reporter(as_json=as_json)
+    with reporter.stage("start-up"):
+        from topobelief.cli import comparison_files
+        from topobelief.cli.plan_files import checked_folder
+        from topobelief.errors import InvalidInputError
+        from topobelief.experiments.strategy_comparison import ComparisonTask
+        from topobelief.report.simulation_tables import comparison_table
+        from topobelief.simulation.comparison import summarised
+        from topobelief.simulation.noise import parse_noise
+        from topobelief.simulation.record import RunOptions
+        from topobelief.simulation.strategies import checked_strategy
+
+        names = tuple(dict.fromkeys(checked_strategy(name.strip()) for name in strategies.split(",")))
+        injected = parse_noise(noise)
+        if injected is None:
+            raise InvalidInputError("expected injected noise to redraw, got physical noise, of which there is one draw a run")
+        folder = out or Path("out") / f"compare-{Path(scenario).stem}"
+        checked_folder(folder)
+        task = ComparisonTask(
+            scenario=scenario,
+            max_detour=max_detour,
+            strategies=names,
+            options=RunOptions(objective=objective, noise=injected),
+            num_redraws=redraws,
+        )
+    with reporter.stage("seeds") as update:
+        runs = comparison_files.compared(task, seeds, folder, num_workers=workers, on_progress=update)
+    found = summarised(runs, baseline=names[0])
+    reporter.say(comparison_table(found, baseline=names[0]))
+    with reporter.stage("pictures"):
+        comparison_files.write(folder, task, runs)
+    reporter.say(f"{folder}: comparison.csv, comparison.json, comparison.png", f"Took {reporter.time_taken()}")
+    reporter.answer(comparison_files.document(task, runs))

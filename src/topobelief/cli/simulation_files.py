@@ -1,0 +1,77 @@
+"""What `topobelief simulate` leaves behind: data after each leg, pictures and a recording at the end."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+
+from topobelief.cli.plan_files import write_together
+from topobelief.errors import InvalidInputError
+from topobelief.simulation.record import Record
+from topobelief.simulation.results import writers
+
+_STALE = ("leg-*.json", "leg-*.png", "run.png", "run.mcap")
+
+
+def require_recorder(wanted: bool) -> None:
+    """Before any work is done for it.
+
+    Raises
+    ------
+    InvalidInputError
+        Where a recording is wanted and the extra is missing.
+    """
+    if wanted and find_spec("foxglove") is None:
+        raise InvalidInputError(
+            "expected foxglove-sdk to be installed for --recording, got none; run pip install 'topobelief[view]'"
+        )
+
+
+class RunFiles:
+    """The folder of one run.
+
+    Parameters
+    ----------
+    folder
+        Made when first written to.
+    keep
+        Whether the files of an earlier run are part of this one; they are removed otherwise.
+    """
+
+    def __init__(self, folder: Path, *, keep: bool) -> None:
+        self._folder, self._keep = folder, keep
+        self.names: list[str] = []
+
+    def write(self, record: Record) -> None:
+        """All data of a run as far as it went, whole or not at all."""
+        files = writers(record)
+        write_together(self._folder, files)
+        record.occupancy.write(self._folder / "map.yaml")
+        if not self._keep:
+            for pattern in _STALE:
+                for path in self._folder.glob(pattern):
+                    if path.name not in files:
+                        path.unlink()
+        self.names = [*files, "map.yaml"]
+
+    def draw(self, record: Record, *, pictures: bool, recording: bool) -> None:
+        """The run, each of its decisions, and the recording."""
+        if pictures:
+            from topobelief.report.canvas import save_figure
+            from topobelief.report.simulation_figures import draw_run, draw_topologies
+
+            figures = {"run.png": draw_run(record)}
+            for each in record.deliberations:
+                leg = record.legs[each.leg]
+                name = f"{record.scenario.name}, leg {each.leg + 1}, to goal {leg.goal}"
+                figures[f"leg-{each.leg + 1}.png"] = draw_topologies(each, record.scenario.world, name=name)
+            write_together(
+                self._folder,
+                {name: lambda path, figure=figure: save_figure(figure, path) for name, figure in figures.items()},
+            )
+            self.names += figures
+        if recording:
+            from topobelief.report.recording import write_recording
+
+            write_together(self._folder, {"run.mcap": lambda path: write_recording(record, path)})
+            self.names.append("run.mcap")

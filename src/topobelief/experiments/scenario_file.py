@@ -1,0 +1,136 @@
+"""Scenarios by name, or from a YAML file with a map of one's own.
+
+    map: building.yaml            # a ROS map, or walls in a .csv; relative to this file
+    unknown: occupied             # what unknown cells of a ROS map are taken for
+    start: [20, 0, 0]             # x, y, heading: metres and radians
+    goals: [[26, 8], [25, -2.95]]
+    candidates: [9, 20]           # paths to compare, one number or one a goal
+    max_detour: 1.3               # none for no limit
+    robot_radius: 0.35            # metres, with which paths are planned
+    lidar: {max_range: 10, range_noise: 0.01}
+    robot: {wheel_slip: 0.02}
+
+Only map, start and goals must be given.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TypeVar, cast, get_args
+
+from topobelief.errors import InvalidInputError
+from topobelief.experiments.study.fields import Field, read_fields
+from topobelief.io.floor_plan import read_world
+from topobelief.io.ros_map import Unknown
+from topobelief.simulation.lidar import LidarSettings
+from topobelief.simulation.robot_settings import RobotSettings
+from topobelief.simulation.scenario import SCENARIO_NAMES, CandidateRule, Goal, Scenario, named_scenario
+
+_Settings = TypeVar("_Settings", RobotSettings, LidarSettings)
+
+
+def scenario_of(name: str) -> Scenario:
+    """A scenario by its name, or the one that a YAML file describes.
+
+    Raises
+    ------
+    InvalidInputError
+        Where it is neither a known name nor a YAML file.
+    FileError
+        Names the file, the line and the field.
+    """
+    if Path(name).suffix.lower() in (".yaml", ".yml"):
+        return read_scenario(Path(name))
+    if name not in SCENARIO_NAMES:
+        raise InvalidInputError(f"expected a scenario of {', '.join(SCENARIO_NAMES)}, or a .yaml file, got {name!r}")
+    return named_scenario(name)
+
+
+def with_detour(scenario: Scenario, max_detour: float | None) -> Scenario:
+    """The scenario with another detour limit; 0 for none, None for its own.
+
+    Raises
+    ------
+    InvalidInputError
+        For a limit between 0 and 1.
+    """
+    if max_detour is None:
+        return scenario
+    if 0 < max_detour < 1:
+        raise InvalidInputError(f"expected a detour limit of at least 1, or 0 for none, got {max_detour:g}")
+    return dataclasses.replace(scenario, rule=dataclasses.replace(scenario.rule, max_detour=max_detour or None))
+
+
+def read_scenario(path: Path) -> Scenario:
+    """The scenario of a YAML file, named as the file is.
+
+    Raises
+    ------
+    FileError
+        Names the file, the line and the field.
+    """
+    top = read_fields(path)
+    keys = top.mapping(
+        required=("map", "start", "goals"), optional=("unknown", "candidates", "max_detour", "robot_radius", "lidar", "robot")
+    )
+    map_file = path.parent / keys["map"].text(expected="the path of a map (.yaml or .csv)")
+    if not map_file.is_file():
+        keys["map"].refuse("the path of a map (.yaml or .csv)", f"{str(map_file)!r}, which is no file")
+    unknown = cast("Unknown", keys["unknown"].choice(get_args(Unknown))) if "unknown" in keys else "occupied"
+    start = keys["start"].numbers(2, 3, expected="a start [x, y] or [x, y, theta]")
+    goals = _goals(keys["goals"], keys.get("candidates"))
+    rule = _rule(keys)
+    robot = _settings(keys.get("robot"), RobotSettings())
+    lidar = _settings(keys.get("lidar"), LidarSettings())
+    try:
+        return Scenario(
+            name=path.stem,
+            world=read_world(map_file, unknown=unknown),
+            start=(start[0], start[1], start[2] if len(start) == 3 else 0.0),
+            goals=goals,
+            rule=rule,
+            robot=robot,
+            lidar=lidar,
+        )
+    except InvalidInputError as error:
+        top.refuse("a start and goals where the robot fits", str(error))
+
+
+def _goals(field: Field, candidates: Field | None) -> tuple[Goal, ...]:
+    places = [item.numbers(2, expected="a goal [x, y]") for item in field.items(expected="a list of goals [x, y]")]
+    counts = [20] * len(places)
+    if candidates is not None and candidates.is_list():
+        counts = [item.whole(at_least=1) for item in candidates.items()]
+        if len(counts) != len(places):
+            candidates.refuse(f"one number, or one for each of the {len(places)} goals")
+    elif candidates is not None:
+        counts = [candidates.whole(at_least=1)] * len(places)
+    return tuple(Goal((x, y), count) for (x, y), count in zip(places, counts, strict=True))
+
+
+def _rule(keys: Mapping[str, Field]) -> CandidateRule:
+    rule = CandidateRule()
+    if "max_detour" in keys:
+        field = keys["max_detour"]
+        unlimited = field.text(expected="a number of at least 1, or none for no limit").lower() == "none"
+        rule = dataclasses.replace(rule, max_detour=None if unlimited else field.number(at_least=1))
+    if "robot_radius" in keys:
+        rule = dataclasses.replace(rule, robot_radius=keys["robot_radius"].number(above=0))
+    return rule
+
+
+def _settings(field: Field | None, default: _Settings) -> _Settings:
+    """Settings with some numbers replaced."""
+    if field is None:
+        return default
+    numbers = [one.name for one in dataclasses.fields(default) if isinstance(getattr(default, one.name), int | float)]
+    values = {
+        name: child.whole(at_least=0) if isinstance(getattr(default, name), int) else child.number()
+        for name, child in field.mapping(optional=numbers).items()
+    }
+    try:
+        return dataclasses.replace(default, **values)
+    except InvalidInputError as error:
+        field.refuse("settings in their ranges", str(error))

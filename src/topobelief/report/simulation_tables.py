@@ -1,0 +1,88 @@
+"""Runs of the simulation for a terminal: a line a leg, a run's metrics, and strategies side by side."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from rich import box
+from rich.table import Table
+from rich.text import Text
+
+from topobelief.report.tables import number, quantity_table
+from topobelief.simulation.comparison import StrategySummary
+from topobelief.simulation.metrics import run_metrics
+from topobelief.simulation.record import Leg, Record
+
+
+def leg_line(leg: Leg) -> str:
+    """What was chosen on the way to a goal, and what came of it."""
+    head = f"goal {leg.goal}" if leg.goal else "approach"
+    chosen = f"path {leg.chosen + 1} of {leg.num_candidates} ({leg.planned:.1f} m); " if leg.num_candidates else ""
+    driven = ""
+    if leg.driven_seconds:
+        driven = f" after {leg.distance:.1f} m in {leg.driven_seconds:.0f} s with {leg.num_closures} loop closures"
+    return f"{head}: {chosen}{leg.outcome}{driven}"
+
+
+def metrics_table(record: Record) -> Table:
+    """Errors, entropies and times of a run."""
+    values = run_metrics(record)
+    rows = [
+        ("goals reached", f"{values['goals_reached']:.0f} of {values['goals']:.0f}"),
+        ("graph", f"{values['poses']:.0f} key poses, {values['closures']:.0f} loop closures"),
+        (
+            "driven",
+            f"{values['distance']:.1f} m in {values['driven_seconds']:.0f} s (simulated), {values['contacts']:.0f} contacts",
+        ),
+    ]
+    for label, name in (
+        ("trajectory error", "slam"),
+        ("  odometry of the graph alone", "odometry_factors"),
+        ("  scan odometry", "scan_odometry"),
+        ("  wheel odometry", "wheel_odometry"),
+    ):
+        whole, before = values[f"error_{name}"], values[f"error_{name}_before"]
+        rows.append((label, f"{whole:.3f} m on all poses, {before:.3f} m on those before the last leg"))
+    if "predicted_entropy" in values:
+        unit = f"nats ({record.options.objective})"
+        told = ", ".join(f"{name} {number(values[f'{name}_entropy'])}" for name in ("prior", "predicted", "achieved"))
+        rows.append(("entropy of the last leg", f"{told} {unit}"))
+    driven = values["driven_seconds"]
+    for label, name in (("making candidates", "candidates_seconds"), ("deciding", "decision_seconds")):
+        share = f", {values[name] / driven:.3%} of the time driven" if driven else ""
+        rows.append((label, f"{values[name]:.3f} s{share}"))
+    return quantity_table(f"{record.scenario.name}: {record.outcome}", rows)
+
+
+def comparison_table(found: Sequence[StrategySummary], *, baseline: str) -> Table:
+    """A line a strategy: medians over the seeds, and the share of seeds in which it beat the baseline."""
+    table = Table(
+        box=box.SIMPLE_HEAD,
+        padding=(0, 1),
+        pad_edge=False,
+        caption=f"medians over seeds; errors in metres, means over redraws; gain: of the error before, against {baseline}; "
+        "before: on the poses that stood before the session",
+        caption_justify="left",
+    )
+    table.add_column("strategy", no_wrap=True)
+    for name in ("arrived", "metres", "closures", "entropy", "error before", "error all", "gain", "better", "same"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for each in found:
+        table.add_row(
+            Text(each.strategy),
+            f"{each.num_arrived}/{each.num_runs}",
+            f"{each.planned:.1f}",
+            f"{each.num_closures:.0f}",
+            number(each.entropy),
+            f"{each.error_shared:.3f}",
+            f"{each.error_all:.3f}",
+            _percent(each.gain),
+            _percent(each.share_better),
+            _percent(each.share_same),
+        )
+    return table
+
+
+def _percent(share: float) -> str:
+    return "–" if math.isnan(share) else f"{share:.0%}"

@@ -1,0 +1,250 @@
+"""The front end: key poses, odometry factors from wheels and scans, and loop closures.
+
+An odometry factor fuses two independent measurements of the same motion, wheel odometry with its slip and the match of the two
+scans. In the tangent at the wheels' pose it is the product of two Gaussians: the laser decides nearly everything, but for the
+direction of a bare corridor, of which its walls say nothing and its information knows. Where the scans do not match, the
+wheels remain, and the factor says why.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.stats import chi2
+
+from topobelief.arrays import FloatArray
+from topobelief.errors import InvalidInputError
+from topobelief.geometry import SE2_GROUP
+from topobelief.simulation.factor import CLOSURE, ODOMETRY, Factor
+from topobelief.simulation.loop_closures import PairwiseConsistency, closure_candidates
+from topobelief.simulation.occupancy import OccupancyMap
+from topobelief.simulation.registration import Registration, RegistrationSettings, ScanCloud, register
+from topobelief.simulation.scan import Scan
+
+__all__ = ["Factor", "FrontEnd", "FrontEndSettings", "wheel_covariance"]
+
+_TYPICAL_POSITION, _TYPICAL_ANGLE = 0.0015, 0.0005  # standard deviations, m and rad
+_WHEEL_GATE = float(chi2.ppf(0.9999, 3))  # of what the laser says against the wheels
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrontEndSettings:
+    """When a key pose is made, and what is believed.
+
+    Parameters
+    ----------
+    key_pose_distance, key_pose_angle
+        Motion after which there is a new key pose, metres and radians.
+    search_radius, min_index_gap
+        Of candidates for a loop closure, metres and key poses.
+    max_rmse, min_matched_share
+        Of a loop closure's match, metres and share of the points.
+    min_odometry_share, min_odometry_wall_share
+        The same and `min_wall_share` for consecutive scans, whose place the wheels vouch for: turning a corner brings much
+        into view.
+    min_wall_share
+        Of a loop closure's match, see `registration.Registration`.
+    max_correction
+        Distance of a match from the estimate, metres.
+    max_turn_correction
+        The same of the heading, radians.
+    pair_confidence, min_agreeing, consistency_window
+        Of pairwise consistency, see `loop_closures.PairwiseConsistency`.
+    wheel_slip, track_width, encoder_sigma
+        The front end's model of wheel odometry: metres per root metre for each wheel, metres, and metres for a reading.
+    registration
+    """
+
+    key_pose_distance: float = 1.0
+    key_pose_angle: float = math.radians(15)
+    search_radius: float = 2.0
+    min_index_gap: int = 5
+    max_rmse: float = 0.3
+    min_matched_share: float = 0.8
+    min_odometry_share: float = 0.5
+    min_odometry_wall_share: float = 0.7
+    min_wall_share: float = 0.85
+    max_correction: float = 1.0
+    max_turn_correction: float = math.radians(20)
+    pair_confidence: float = 0.9999
+    min_agreeing: int = 2
+    consistency_window: int = 10
+    wheel_slip: float = 0.008
+    track_width: float = 0.33
+    encoder_sigma: float = 0.001
+    registration: RegistrationSettings = field(default_factory=RegistrationSettings)
+
+    def __post_init__(self) -> None:
+        for name in ("key_pose_distance", "key_pose_angle", "search_radius", "max_rmse", "track_width", "encoder_sigma"):
+            if not (math.isfinite(value := getattr(self, name)) and value > 0):
+                raise InvalidInputError(f"expected {name} above 0, got {value}")
+        if self.min_index_gap < 2:
+            raise InvalidInputError(f"expected min_index_gap of at least 2, got {self.min_index_gap}")
+
+    @property
+    def expected_information(self) -> FloatArray:
+        """Of a factor among walls on all sides, shape (3, 3): the median of some 1400 matches in `office` and `lab`."""
+        return np.diag([_TYPICAL_POSITION**-2, _TYPICAL_POSITION**-2, _TYPICAL_ANGLE**-2])
+
+    @property
+    def gate_information(self) -> FloatArray:
+        """What a closure is known by if its walls say nothing, shape (3, 3): it stays within the largest corrections."""
+        sigmas = np.array([self.max_correction, self.max_correction, self.max_turn_correction])
+        return np.diag(sigmas**-2)
+
+
+class FrontEnd:
+    """Turns wheel odometry and scans into factors; it never sees the true pose.
+
+    Parameters
+    ----------
+    settings
+    start : shape (3,)
+        The first pose.
+    """
+
+    def __init__(self, *, settings: FrontEndSettings | None = None, start: FloatArray) -> None:
+        self.settings = settings or FrontEndSettings()
+        self.start = np.array(start, dtype=np.float64)
+        self.scans: list[Scan] = []
+        self._clouds: list[ScanCloud] = []
+        self._wheel = SE2_GROUP.identity()
+        self._consistency = PairwiseConsistency(
+            confidence=self.settings.pair_confidence,
+            min_agreeing=self.settings.min_agreeing,
+            window=self.settings.consistency_window,
+        )
+
+    def wants_key_pose(self, wheel_odometry: FloatArray) -> bool:
+        """Whether the robot has moved enough since the last key pose, or there is none yet."""
+        if not self.scans:
+            return True
+        x, y, theta = SE2_GROUP.between(self._wheel, wheel_odometry).tolist()
+        return math.hypot(x, y) >= self.settings.key_pose_distance or abs(theta) >= self.settings.key_pose_angle
+
+    def add(self, wheel_odometry: FloatArray, scan: Scan) -> Factor | None:
+        """A key pose.
+
+        Parameters
+        ----------
+        wheel_odometry : shape (3,)
+            Pose by the wheels, in any fixed frame.
+        scan
+            Made there.
+
+        Returns
+        -------
+        Factor or None
+            From the last key pose to this one; None for the first.
+        """
+        cloud = ScanCloud(scan)
+        factor = None
+        if self.scans:
+            factor = self._odometry(SE2_GROUP.between(self._wheel, wheel_odometry), cloud)
+            self._consistency.chain.append(factor)
+        self.scans.append(scan)
+        self._clouds.append(cloud)
+        self._wheel = np.array(wheel_odometry, dtype=np.float64)
+        return factor
+
+    def pose_now(self, key_pose_estimate: FloatArray, wheel_odometry: FloatArray, scan: Scan | None = None) -> FloatArray:
+        """Where the robot is between key poses.
+
+        Parameters
+        ----------
+        key_pose_estimate : shape (3,)
+            Of the last key pose.
+        wheel_odometry : shape (3,)
+        scan
+            To refine it by; without one the wheels alone lead on from the key pose.
+
+        Returns
+        -------
+        shape (3,)
+        """
+        motion = SE2_GROUP.between(self._wheel, wheel_odometry)
+        if scan is not None:
+            motion = self._odometry(motion, ScanCloud(scan)).measurement
+        return SE2_GROUP.compose(key_pose_estimate, motion)
+
+    def closures(self, poses: FloatArray, occupancy: OccupancyMap | None) -> list[Factor]:
+        """Loop closures that can be believed now: of the newest key pose, and earlier ones that it confirms.
+
+        Parameters
+        ----------
+        poses : shape (n, 3)
+            Current estimate of all key poses.
+        occupancy
+            The map so far; None: no test of the line of sight.
+        """
+        settings, newest = self.settings, len(self.scans) - 1
+        if len(poses) != len(self.scans):
+            raise InvalidInputError(f"expected an estimate of all {len(self.scans)} key poses, got {len(poses)}")
+        earlier = closure_candidates(
+            poses, occupancy, search_radius=settings.search_radius, min_index_gap=settings.min_index_gap
+        )
+        matches: list[Factor] = []
+        for i in earlier.tolist():
+            guess = SE2_GROUP.between(poses[i], poses[-1])
+            match = self._match(i, self._clouds[-1], guess, settings.min_matched_share, settings.min_wall_share)
+            if isinstance(match, Registration) and self._is_near(match, guess):
+                matches.append(Factor(i, newest, match.pose, match.information + settings.gate_information, CLOSURE))
+        return self._consistency.believed(matches)
+
+    def _odometry(self, motion: FloatArray, cloud: ScanCloud) -> Factor:
+        """The motion since the last key pose, by wheels and laser."""
+        newest = len(self.scans) - 1
+        wheels: FloatArray = np.linalg.inv(wheel_covariance(motion, self.settings)).astype(np.float64)
+        settings = self.settings
+        match = self._match(newest, cloud, motion, settings.min_odometry_share, settings.min_odometry_wall_share)
+        if isinstance(match, str):
+            return Factor(newest, newest + 1, motion, wheels, ODOMETRY, match)
+        correction = SE2_GROUP.log(SE2_GROUP.between(motion, match.pose))
+        information = wheels + match.information
+        share: FloatArray = np.linalg.solve(information, match.information @ correction).astype(np.float64)
+        # (correction)^T (Sigma_wheels + Sigma_laser)^-1 (correction), written for a singular laser
+        if float(correction @ wheels @ share) > _WHEEL_GATE:
+            note = f"laser and wheels apart by {math.hypot(*correction[:2]):.2f} m, {math.degrees(correction[2]):.1f} deg"
+            return Factor(newest, newest + 1, motion, wheels, ODOMETRY, note)
+        return Factor(newest, newest + 1, SE2_GROUP.compose(motion, SE2_GROUP.exp(share)), information, ODOMETRY)
+
+    def _match(
+        self, i: int, cloud: ScanCloud, guess: FloatArray, min_share: float, min_wall_share: float
+    ) -> Registration | str:
+        """A match with the scan of key pose i, or why there is none."""
+        settings = self.settings
+        match = register(self._clouds[i], cloud, guess, settings.registration)
+        if match is None:
+            return "too few points to match"
+        if match.rmse > settings.max_rmse or match.matched_share < min_share or match.wall_share < min_wall_share:
+            return (
+                f"poor match: {100 * match.matched_share:.0f} % of points, {100 * match.wall_share:.0f} % of them on walls, "
+                f"RMSE {match.rmse:.2f} m"
+            )
+        return match
+
+    def _is_near(self, match: Registration, guess: FloatArray) -> bool:
+        x, y, theta = SE2_GROUP.between(guess, match.pose).tolist()
+        return math.hypot(x, y) <= self.settings.max_correction and abs(theta) <= self.settings.max_turn_correction
+
+
+def wheel_covariance(motion: FloatArray, settings: FrontEndSettings) -> FloatArray:
+    """Covariance of wheel odometry over a motion, in the tangent at its end, shape (3, 3).
+
+    Each wheel is off by a random walk in the distance that it rolled. Its mean moves the robot ahead, its difference turns
+    it; turns on the way swing the end sideways, by half the distance per radian and on the average of their squares a third.
+
+    Parameters
+    ----------
+    motion : shape (3,)
+    settings
+    """
+    distance, turn = math.hypot(motion[0], motion[1]), abs(float(motion[2]))
+    rolled = distance + turn * settings.track_width / 2
+    wheel = settings.wheel_slip**2 * rolled + settings.encoder_sigma**2
+    angle = 2 * wheel / settings.track_width**2
+    covariance = np.diag([wheel / 2, angle * distance**2 / 3, angle]) + settings.encoder_sigma**2 * np.diag([1.0, 1.0, 0.0])
+    covariance[1, 2] = covariance[2, 1] = angle * float(motion[0]) / 2
+    return covariance

@@ -1,0 +1,90 @@
+"""Noise added to registered factors, so that its level changes the graph and not the driving.
+
+The levels are those of Kitanov and Indelman (arXiv 1903.00927): sigma_p = 0.1 m and xi = sigma_theta / sigma_p of 0.1, 0.35 and
+0.85 rad/m. `physical` adds nothing: there slip, encoders and the laser are all the noise there is.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from topobelief.arrays import FloatArray
+from topobelief.errors import InvalidInputError
+from topobelief.geometry import SE2_GROUP
+from topobelief.simulation.factor import Factor
+
+PHYSICAL = "physical"
+PAPER_LEVELS = (0.1, 0.35, 0.85)
+"""xi, rad/m."""
+
+
+@dataclass(frozen=True, slots=True)
+class InjectedNoise:
+    """N(0, diag(sigma_p², sigma_p², sigma_theta²)) in the tangent at the measured pose.
+
+    Attributes
+    ----------
+    sigma_p, sigma_theta
+        Metres and radians.
+    """
+
+    sigma_p: float
+    sigma_theta: float
+
+    def __post_init__(self) -> None:
+        if not (0 < self.sigma_p < math.inf and 0 < self.sigma_theta < math.inf):
+            raise InvalidInputError(
+                f"expected standard deviations above 0, got sigma_p = {self.sigma_p:g} and sigma_theta = {self.sigma_theta:g}"
+            )
+
+    @classmethod
+    def of_ratio(cls, xi: float, *, sigma_p: float = 0.1) -> InjectedNoise:
+        """The noise of a ratio xi = sigma_theta / sigma_p, rad/m."""
+        return cls(sigma_p, xi * sigma_p)
+
+    @property
+    def xi(self) -> float:
+        """sigma_theta / sigma_p, rad/m."""
+        return self.sigma_theta / self.sigma_p
+
+    @property
+    def information(self) -> FloatArray:
+        """Shape (3, 3)."""
+        return np.diag([self.sigma_p**-2, self.sigma_p**-2, self.sigma_theta**-2])
+
+    def disturbed(self, measurements: FloatArray, *, rng: np.random.Generator) -> FloatArray:
+        """Measurements with noise, shape (..., 3)."""
+        tangent = rng.standard_normal(measurements.shape) * (self.sigma_p, self.sigma_p, self.sigma_theta)
+        return SE2_GROUP.compose(measurements, SE2_GROUP.exp(tangent))
+
+    def added_to(self, factor: Factor, *, rng: np.random.Generator) -> Factor:
+        """The factor with noise in its measurement, and this noise as its information."""
+        return replace(factor, measurement=self.disturbed(factor.measurement, rng=rng), information=self.information)
+
+
+def parse_noise(text: str) -> InjectedNoise | None:
+    """`physical` (None), a ratio xi, or `sigma_p,sigma_theta`.
+
+    Raises
+    ------
+    InvalidInputError
+        For anything else.
+    """
+    if text == PHYSICAL:
+        return None
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    match numbers:
+        case [xi]:
+            return InjectedNoise.of_ratio(xi)
+        case [sigma_p, sigma_theta]:
+            return InjectedNoise(sigma_p, sigma_theta)
+        case _:
+            raise InvalidInputError(
+                f'expected noise as "physical", a ratio such as 0.35, or "sigma_p,sigma_theta" in m and rad, got {text!r}'
+            )

@@ -1,0 +1,240 @@
+"""What a run leaves: plain values, complete at any moment, from which pictures, tables and a continuation are made."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from topobelief.arrays import FloatArray
+from topobelief.candidates.polyline import path_length
+from topobelief.errors import InvalidInputError
+from topobelief.graph.action import Action
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.planning.objectives import ObjectiveName
+from topobelief.simulation.noise import InjectedNoise
+from topobelief.simulation.occupancy import OccupancyMap
+from topobelief.simulation.scan import Scan
+from topobelief.simulation.scenario import Scenario
+from topobelief.simulation.strategies import Choice
+
+ARRIVED, INTERRUPTED = "arrived", "interrupted"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunOptions:
+    """What a run may vary in a scenario.
+
+    Attributes
+    ----------
+    strategy, objective
+        How paths are chosen (`strategies.checked_strategy`), and what the planner minimises.
+    seed
+        The same seed gives the same run on one machine.
+    noise : InjectedNoise or None
+        None: physical noise alone.
+    unknown
+        Start with an empty map instead of the floor plan.
+    """
+
+    strategy: str = "spanning_trees"
+    objective: ObjectiveName = "joint"
+    seed: int = 0
+    noise: InjectedNoise | None = None
+    unknown: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Leg:
+    """A way that was planned and driven: to a goal, or as far as it went.
+
+    Attributes
+    ----------
+    goal
+        Counts from 1; 0 for the approach, on which nothing is decided.
+    first_pose, last_pose
+        Key poses at its begin and end.
+    outcome
+        "arrived", "interrupted", or why it ended, in words.
+    num_candidates, chosen
+        The latter counts from 0.
+    planned, distance
+        Length of the chosen path and of what was driven, metres.
+    num_closures
+        Loop closures that the front end accepted on the way.
+    prior_entropy, predicted_entropy, achieved_entropy
+        The objective before, as the chosen action predicts it, and of what came of it; nan where nothing was decided.
+    candidates_seconds, decision_seconds
+        Wall time of making the candidates and of choosing one.
+    driven_seconds
+        Simulated time.
+    contacts
+        Control periods in which the chassis touched a wall.
+    """
+
+    goal: int
+    first_pose: int
+    last_pose: int
+    outcome: str
+    num_candidates: int = 0
+    chosen: int = 0
+    planned: float = float("nan")
+    distance: float = 0.0
+    num_closures: int = 0
+    prior_entropy: float = float("nan")
+    predicted_entropy: float = float("nan")
+    achieved_entropy: float = float("nan")
+    candidates_seconds: float = 0.0
+    decision_seconds: float = 0.0
+    driven_seconds: float = 0.0
+    contacts: int = 0
+
+    @property
+    def arrived(self) -> bool:
+        """Whether its goal was reached, by the robot's own estimate."""
+        return self.outcome == ARRIVED
+
+
+@dataclass(frozen=True, eq=False, slots=True, kw_only=True)
+class Deliberation:
+    """A decision and all that it was made from.
+
+    Attributes
+    ----------
+    leg
+        Index of the leg that it led to.
+    prior : PoseGraph
+        The belief that was decided on.
+    paths, actions
+        K candidates.
+    entropies : shape (K,)
+        Their exact objective, whether or not the strategy looked at it.
+    choice
+    """
+
+    leg: int
+    prior: PoseGraph
+    paths: Sequence[FloatArray]
+    actions: Sequence[Action]
+    entropies: FloatArray
+    choice: Choice
+
+    @property
+    def lengths(self) -> FloatArray:
+        """Of the paths, metres, shape (K,)."""
+        return np.array([path_length(path) for path in self.paths])
+
+
+@dataclass(frozen=True, eq=False, slots=True, kw_only=True)
+class KeyPoses:
+    """What the robot sensed at each key pose, and, for scoring alone, where it truly was.
+
+    Attributes
+    ----------
+    times : shape (n,)
+        Seconds.
+    truth, wheel_odometry : shape (n, 3)
+        In the world; the latter from the known start on.
+    scans
+        n of them.
+    """
+
+    times: FloatArray
+    truth: FloatArray
+    wheel_odometry: FloatArray
+    scans: tuple[Scan, ...]
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def first(self, count: int) -> KeyPoses:
+        """The first `count` of them."""
+        return KeyPoses(
+            times=self.times[:count],
+            truth=self.truth[:count],
+            wheel_odometry=self.wheel_odometry[:count],
+            scans=self.scans[:count],
+        )
+
+
+@dataclass(frozen=True, eq=False, slots=True, kw_only=True)
+class History:
+    """What a run can be continued from.
+
+    Attributes
+    ----------
+    key_poses
+    legs
+    track : shape (t, 7)
+        Time, true pose and believed pose, several times a second.
+    """
+
+    key_poses: KeyPoses
+    legs: tuple[Leg, ...]
+    track: FloatArray
+
+    def before_goal(self, goal: int) -> History:
+        """The part that ends where the leg to a goal began.
+
+        Raises
+        ------
+        InvalidInputError
+            Where no leg to it began.
+        """
+        begun = [number for number, leg in enumerate(self.legs) if leg.goal == goal]
+        if not begun:
+            raise InvalidInputError(f"expected a run that set out for goal {goal}, got one of {len(self.legs)} legs")
+        key_poses = self.key_poses.first(self.legs[begun[0]].first_pose + 1)
+        return History(
+            key_poses=key_poses,
+            legs=self.legs[: begun[0]],
+            track=self.track[self.track[:, 0] <= key_poses.times[-1]],
+        )
+
+
+@dataclass(frozen=True, eq=False, slots=True, kw_only=True)
+class Record:
+    """A run as far as it went.
+
+    Attributes
+    ----------
+    scenario, options
+    history
+        Legs in order, those of earlier runs that were resumed included, and what was sensed on them.
+    estimate : shape (n, 3)
+        What the robot drove by.
+    graph, registered : PoseGraph
+        What it decided on, at its own estimate, and the same without injected noise.
+    occupancy
+        The map at the end.
+    deliberations
+        Of this run.
+    outcome
+        "arrived" where all goals were reached, else what the last leg says.
+    """
+
+    scenario: Scenario
+    options: RunOptions
+    history: History
+    estimate: FloatArray
+    graph: PoseGraph
+    registered: PoseGraph
+    occupancy: OccupancyMap
+    deliberations: tuple[Deliberation, ...]
+    outcome: str
+
+    @property
+    def truth(self) -> FloatArray:
+        """True key poses, shape (n, 3). For scoring alone."""
+        return self.history.key_poses.truth
+
+    @property
+    def legs(self) -> tuple[Leg, ...]:
+        """In order."""
+        return self.history.legs
+
+    @property
+    def num_goals_reached(self) -> int:
+        """How many goals were reached."""
+        return sum(leg.arrived for leg in self.legs if leg.goal > 0)

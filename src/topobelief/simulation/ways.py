@@ -1,0 +1,70 @@
+"""Ways to a goal in the world as the robot knows it, and what its laser sees to stand in one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from topobelief.arrays import FloatArray
+from topobelief.candidates.diverse_paths import diverse_paths
+from topobelief.candidates.polyline import distances_to_segments, path_length, stations
+from topobelief.candidates.roadmap import build_roadmap
+from topobelief.simulation.scenario import CandidateRule, Goal
+from topobelief.world import World
+
+_NEAR = np.arange(0.05, 1.0, 0.05)  # m, in which a robot that stands too close to a wall looks for room
+_DIRECTIONS = np.linspace(-np.pi, np.pi, 24, endpoint=False)
+_ROOM = 1.05  # times its radius
+_TIGHT = 0.95  # of a goal's clearance, where that is less
+
+
+def candidate_paths(world: World, here: FloatArray, goal: Goal, rule: CandidateRule, *, seed: int) -> list[FloatArray]:
+    """Diverse paths to a goal, shortest first, each of shape (waypoints, 2).
+
+    They begin where the robot stands or, where that is too close to a wall (its estimate or its map may err), at the next place
+    with room. Where the goal has less room than the rule asks for, the radius is what fits.
+
+    Raises
+    ------
+    PlanningError
+        Where there is no way.
+    """
+    radius = min(rule.robot_radius, _TIGHT * max(0.0, float(world.clearance([goal.place])[0])))
+    radius = radius if radius > 0 else rule.robot_radius  # an occupied goal is refused by name
+    start = place_with_room(world, here[:2], radius)
+    roadmap = build_roadmap(world, start, goal.place, rule.num_vertices, radius, seed)
+    return diverse_paths(roadmap, start, goal.place, goal.num_paths, rule.max_detour, seed)
+
+
+def place_with_room(world: World, here: FloatArray, radius: float) -> FloatArray:
+    """The place itself, or the next one with room for a radius, shape (2,); the place itself where there is none nearby."""
+    if float(world.clearance(here[None])[0]) > radius:
+        return here
+    around = np.stack([np.cos(_DIRECTIONS), np.sin(_DIRECTIONS)], axis=1)
+    for distance in _NEAR.tolist():
+        places = here + distance * around
+        clearances = world.clearance(places)
+        if clearances.max() > _ROOM * radius:
+            return places[int(np.argmax(clearances))]
+    return here
+
+
+def stands_in_the_way(points: FloatArray, path: FloatArray, *, radius: float, ahead: float) -> bool:
+    """Whether a point is within a radius of the first metres of a path.
+
+    Parameters
+    ----------
+    points : shape (k, 2)
+        What the laser met, in the frame of the path.
+    path : shape (waypoints, 2)
+    radius, ahead
+        Metres.
+    """
+    length = path_length(path)
+    if len(path) < 2 or length == 0 or len(points) == 0:
+        return False
+    cut = min(ahead, length)
+    end = stations(path, np.array([cut])).positions
+    so_far = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))]
+    part = np.concatenate([path[so_far < cut], end])
+    near = points[np.linalg.norm(points - part[0], axis=1) <= ahead + radius]
+    return any(bool(distances_to_segments(point, part[:-1], part[1:]).min() < radius) for point in near)

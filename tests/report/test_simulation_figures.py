@@ -1,0 +1,112 @@
+"""Pictures and tables of runs show what the record holds."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+from rich.console import Console
+
+from simulation_records import made_record
+from topobelief.report.canvas import save_figure
+from topobelief.report.simulation_figures import draw_comparison, draw_run, draw_topologies
+from topobelief.report.simulation_tables import comparison_table, leg_line, metrics_table
+from topobelief.simulation.comparison import ComparedRun, summarised
+from topobelief.simulation.metrics import run_metrics
+from topobelief.simulation.noise import InjectedNoise
+
+
+def texts(figure) -> str:
+    """All words of a figure."""
+    found = [text.get_text() for text in figure.texts]
+    for axes in figure.axes:
+        found += [text.get_text() for text in axes.texts]
+    for legend in figure.legends:
+        found += [text.get_text() for text in legend.get_texts()]
+    return "\n".join(found)
+
+
+def lines_of(figure, colour: str) -> list:
+    return [line for axes in figure.axes for line in axes.lines if line.get_color() == colour]
+
+
+def shown(table) -> str:
+    text = io.StringIO()
+    Console(file=text, width=160).print(table)
+    return text.getvalue()
+
+
+def test_a_run_shows_its_tracks(tmp_path):
+    record = made_record()
+    figure = draw_run(record)
+    words = texts(figure)
+    assert "2 of 2 goals reached, 15 m, 8 key poses" in words
+    assert "physical noise, seed 3" in words
+    for label in ("true track", "wheel odometry", "estimate", "loop closures (1)", "95 % of a position"):
+        assert label in words
+    assert "odometry of the graph alone" not in words
+    assert "not reached" not in words
+    save_figure(figure, tmp_path / "run.png")
+    assert (tmp_path / "run.png").stat().st_size > 20_000
+
+
+def test_injected_noise_shows_what_it_was_added_to():
+    assert "odometry of the graph alone" in texts(draw_run(made_record(noise=InjectedNoise.of_ratio(0.85))))
+
+
+def test_a_goal_not_reached_is_told_apart():
+    words = texts(draw_run(made_record(outcome="stuck: no progress")))
+    assert "goal, not reached" in words
+    assert "1 of 2 goals" in words
+
+
+def test_the_best_and_the_worst_topology():
+    record = made_record()
+    each = record.deliberations[0]
+    figure = draw_topologies(each, record.scenario.world, name="room, leg 2")
+    words = texts(figure)
+    best = int(each.entropies.argmin())
+    assert f"Candidate {best + 1} of 2, least entropy, chosen" in words
+    assert f"Candidate {2 - best} of 2, greatest entropy" in words
+    assert f"{each.entropies.max():.1f} nats" in words
+    assert "room, leg 2" in words
+
+
+@pytest.fixture
+def runs() -> list[ComparedRun]:
+    common = {"outcome": "arrived", "shortest": 9.0, "num_poses": 30, "num_shared": 20, "num_closures": 4}
+    return [
+        ComparedRun(
+            seed=seed,
+            strategy=strategy,
+            planned=10.0,
+            entropy=-50.0,
+            error_shared=error + seed / 100,
+            error_all=error,
+            spread_shared=0.1,
+            error_before=0.5,
+            **common,
+        )
+        for seed in range(4)
+        for strategy, error in (("shortest", 0.4), ("spanning_trees", 0.3), ("random", 0.5))
+    ]
+
+
+def test_strategies_side_by_side(runs):
+    figure = draw_comparison(runs, baseline="shortest")
+    words = texts(figure)
+    assert "better in 100%" in words
+    assert "better in 0%" in words
+    assert "spanning trees" in words
+    table = shown(comparison_table(summarised(runs, baseline="shortest"), baseline="shortest"))
+    assert "4/4" in table
+    assert "24%" in table  # (0.415 - 0.315) / 0.415
+
+
+def test_a_run_in_words():
+    record = made_record()
+    metrics = run_metrics(record)
+    table = shown(metrics_table(record))
+    assert f"{metrics['error_slam']:.3f} m on all poses" in table
+    assert "0.036% of the time driven" in table
+    assert leg_line(record.legs[1]) == "goal 2: path 1 of 2 (10.0 m); arrived after 10.2 m in 20 s with 1 loop closures"

@@ -1,0 +1,80 @@
+"""Redrawn noise: expectations, common draws for common factors, and a choice that shows in the errors."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from topobelief.estimation import optimize
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.simulation.comparison import ComparedRun, redrawn_errors, restricted, summarised
+from topobelief.simulation.metrics import trajectory_error
+from topobelief.simulation.noise import InjectedNoise
+
+NOISE = InjectedNoise.of_ratio(0.35)
+
+
+@pytest.fixture(scope="module")
+def loop() -> PoseGraph:
+    """Thirty poses around a square and back at its start, one closure."""
+    corners = np.array([(0, 0), (8, 0), (8, 8), (0, 8), (0, 0.5)], dtype=float)
+    places = np.concatenate([np.linspace(a, b, 8, endpoint=False) for a, b in pairwise(corners)])
+    headings = np.repeat(np.arange(4) * np.pi / 2, 8)
+    edges = [*((i, i + 1) for i in range(31)), (31, 0)]
+    return PoseGraph(np.column_stack([places, headings]), edges, None, np.eye(3))
+
+
+def test_redraws_are_estimates_under_noise(loop):
+    errors = redrawn_errors(loop, loop.poses, NOISE, num_redraws=3, seed=4, num_poses=(32, 10))
+    measured = NOISE.disturbed(loop.measurements, rng=np.random.default_rng([4, 1]))
+    estimate = optimize(PoseGraph(loop.poses, loop.edges, measured, NOISE.information)).poses
+    assert errors.shape == (3, 2)
+    assert errors[1].tolist() == [trajectory_error(estimate, loop.poses), trajectory_error(estimate, loop.poses, num_poses=10)]
+
+
+def test_graphs_share_the_noise_of_the_factors_that_they_share(loop):
+    """Open chains: what is added behind the tenth pose does not change the errors before it."""
+    chain = PoseGraph(loop.poses, loop.edges[:-1], None, np.eye(3))
+    long, short = (
+        redrawn_errors(graph, loop.poses[: graph.num_poses], NOISE, num_redraws=4, seed=0, num_poses=(11,))
+        for graph in (chain, restricted(chain, 11))
+    )
+    np.testing.assert_allclose(long, short, atol=1e-6)
+
+
+def test_a_closure_lowers_the_expected_error(loop):
+    chain = PoseGraph(loop.poses, loop.edges[:-1], None, np.eye(3))
+    open_end, closed = (
+        redrawn_errors(graph, loop.poses, NOISE, num_redraws=40, seed=1, num_poses=(32,)) for graph in (chain, loop)
+    )
+    assert closed.mean() < 0.8 * open_end.mean()
+
+
+def run(seed: int, strategy: str, error: float) -> ComparedRun:
+    return ComparedRun(
+        seed=seed,
+        strategy=strategy,
+        outcome="arrived",
+        planned=10.0,
+        shortest=9.0,
+        num_poses=30,
+        num_shared=20,
+        num_closures=4,
+        entropy=-50.0,
+        error_shared=error,
+        error_all=error,
+        spread_shared=0.0,
+        error_before=0.5,
+    )
+
+
+def test_a_summary_pairs_runs_by_seed():
+    runs = [run(seed, "shortest", error) for seed, error in enumerate((1.0, 2.0, 3.0, 4.0))]
+    runs += [run(seed, "spanning_trees", error) for seed, error in enumerate((0.5, 2.0, 3.5, 1.0))]
+    shortest, trees = summarised(runs, baseline="shortest")
+    assert (shortest.gain, shortest.share_better, shortest.share_same) == (0.0, 0.0, 1.0)
+    assert trees.gain == pytest.approx(1 - 1.5 / 2.5)
+    assert (trees.share_better, trees.share_same) == (0.5, 0.25)
+    assert np.isnan(summarised(runs, baseline="random")[0].gain)

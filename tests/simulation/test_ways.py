@@ -1,0 +1,62 @@
+"""Ways from where a robot stands, also too close to a wall, and walls that turn up in them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from topobelief.errors import PlanningError
+from topobelief.simulation.scenario import CandidateRule, Goal
+from topobelief.simulation.ways import candidate_paths, place_with_room, stands_in_the_way
+from topobelief.world import World
+
+RULE = CandidateRule(num_vertices=150)
+
+
+@pytest.fixture(scope="module")
+def room() -> World:
+    return World.from_boxes([(3, 3, 5, 5)], bounds=(0, 0, 8, 8))
+
+
+def test_a_robot_in_the_open_starts_where_it_is(room):
+    paths = candidate_paths(room, np.array([1.0, 1.0, 0.0]), Goal((7, 7), 4), RULE, seed=0)
+    assert 1 < len(paths) <= 4
+    for path in paths:
+        assert path[0].tolist() == [1, 1]
+        assert path[-1].tolist() == [7, 7]
+
+
+def test_a_robot_by_a_wall_steps_away_first(room):
+    here = np.array([0.1, 4.0])
+    place = place_with_room(room, here, 0.35)
+    assert room.clearance([place])[0] > 0.35
+    assert 0.25 < np.linalg.norm(place - here) < 0.4
+    (path, *_) = candidate_paths(room, np.array([*here, 0.0]), Goal((7, 7)), RULE, seed=0)
+    assert path[0].tolist() == place.tolist()
+
+
+def test_a_robot_far_from_any_room_stays(room):
+    here = np.array([-4.0, 4.0])
+    assert place_with_room(room, here, 0.35).tolist() == here.tolist()
+
+
+def test_a_tight_goal_is_planned_for_what_fits(room):
+    (path, *_) = candidate_paths(room, np.array([1.0, 1.0, 0.0]), Goal((7.7, 7.7), 2), RULE, seed=0)
+    assert path[-1].tolist() == [7.7, 7.7]
+    with pytest.raises(PlanningError, match="in an obstacle"):
+        candidate_paths(room, np.array([1.0, 1.0, 0.0]), Goal((4, 4), 2), RULE, seed=0)
+
+
+def test_what_stands_in_the_way_is_near_and_ahead():
+    path = np.array([(0, 0), (1, 0), (1, 3)], dtype=float)
+
+    def blocked(*point: float) -> bool:
+        return stands_in_the_way(np.array([point]), path, radius=0.25, ahead=1.5)
+
+    assert blocked(0.5, 0.2)
+    assert not blocked(0.5, 0.3)
+    assert blocked(1.2, 0.4)
+    assert blocked(1.0, 0.7)
+    assert not blocked(1.0, 0.8)  # too far ahead
+    assert not stands_in_the_way(np.zeros((0, 2)), path, radius=0.25, ahead=1.5)
+    assert not stands_in_the_way(path, path[:1], radius=0.25, ahead=1.5)
