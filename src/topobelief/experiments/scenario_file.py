@@ -21,9 +21,9 @@ from pathlib import Path
 from typing import TypeVar, cast, get_args
 
 from topobelief.errors import InvalidInputError
-from topobelief.experiments.study.fields import Field, read_fields
 from topobelief.io.floor_plan import read_world
 from topobelief.io.ros_map import Unknown
+from topobelief.io.yaml_fields import Field, read_fields
 from topobelief.simulation.lidar import LidarSettings
 from topobelief.simulation.robot_settings import RobotSettings
 from topobelief.simulation.scenario import SCENARIO_NAMES, CandidateRule, Goal, Scenario, named_scenario
