@@ -1,5 +1,6 @@
 # Everything runs in .venv, which `make install` builds; nothing else is needed but Python 3.11 or newer.
-# No system package is needed: GTSAM, qdldl, shapely and the node that pyright runs on come as Python wheels.
+# GTSAM, qdldl, MuJoCo and the node that pyright runs on come as Python wheels. One system package is installed if it is not there
+# and apt-get may: chromium, in which the tests open the report of `topobelief reproduce`. Without it those tests are skipped.
 PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3; do command -v $$p >/dev/null 2>&1 && \
   $$p -c 'import sys, venv; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
 BIN := .venv/bin
@@ -16,6 +17,8 @@ $(STAMP): pyproject.toml constraints.txt
 	$(BIN)/python -m compileall -q src
 	$(BIN)/python -c 'import matplotlib.font_manager' # builds its font cache
 	$(BIN)/python -m topobelief.planning.compile_kernels # once a machine, half a minute
+	@command -v chromium >/dev/null 2>&1 || { echo "installing chromium, for the tests of the report"; \
+	  { apt-get update && apt-get install -y --no-install-recommends chromium; } >/dev/null 2>&1 || echo "not installed: these tests are skipped"; }
 	touch $(STAMP)
 
 demo: install
