@@ -2,10 +2,14 @@
 
 import json
 
+import numpy as np
 import pytest
 
+from topobelief import write_g2o
 from topobelief.cli.app import run
+from topobelief.experiments.benchmark.certificates import block_isotropic
 from topobelief.experiments.benchmark.run import SCHEMA, BenchmarkPlan
+from topobelief.experiments.benchmark.sessions import city_drive
 
 
 @pytest.fixture
@@ -38,6 +42,16 @@ def test_two_sizes_make_a_picture(tiny, tmp_path, capsys):
     assert run(["benchmark", "--quick", "--sizes", "20,30", "--out", str(tmp_path)]) == 0
     assert (tmp_path / "benchmark.png").stat().st_size > 20_000
     assert "benchmark.png" in capsys.readouterr().out
+
+
+def test_a_file_alone(tiny, tmp_path, capsys):
+    graph = city_drive(30, block_isotropic(0.1, 0.035), rng=np.random.default_rng(0))
+    write_g2o(graph, tmp_path / "mine.g2o")
+    assert run(["benchmark", str(tmp_path / "mine.g2o"), "--quick", "--sizes", "", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert [session["name"] for session in document["sessions"]] == ["mine"]
+    assert document["memory"] == document["error_bounds"] == []
+    assert len(document["proofs"]) == 6
 
 
 def test_options_go_before_the_quick_plan_and_json_is_all_that_is_printed(tiny, capsys):

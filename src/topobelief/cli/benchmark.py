@@ -16,7 +16,8 @@ def benchmark(
         typer.Argument(metavar="[GRAPH]...", help="Pose graphs to measure beside generated ones, .g2o or .toro."),
     ] = None,
     sizes: Annotated[
-        str | None, typer.Option(help="Poses of the generated graphs, by commas; 1000,3500,10000,100000 if not given.")
+        str | None,
+        typer.Option(help="Poses of the generated graphs, by commas; 1000,3500,10000,100000 if not given, none if empty."),
     ] = None,
     candidates: Annotated[int | None, typer.Option(help="Actions of a session; 1000 if not given.", min=2)] = None,
     repeat: Annotated[int | None, typer.Option(help="Repetitions of each timing; 5 if not given.", min=1)] = None,
@@ -55,6 +56,7 @@ def benchmark(
     plan = replace(
         base,
         sizes=base.sizes if sizes is None else parse_sizes(sizes),
+        memory_sizes=base.memory_sizes if sizes is None else parse_sizes(sizes),
         files=tuple(graph_files or ()),
         num_actions=candidates or base.num_actions,
         repetitions=repeat or base.repetitions,

@@ -10,7 +10,7 @@ from importlib.metadata import version
 from importlib.util import find_spec
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from topobelief.experiments.benchmark.certificates import (
     proof_size,
 )
 from topobelief.experiments.benchmark.memory import peak_gigabytes
-from topobelief.experiments.benchmark.sessions import BenchmarkSession, candidate_paths, city_drive
+from topobelief.experiments.benchmark.sessions import BenchmarkSession, ClosureStyle, candidate_paths, city_drive
 from topobelief.experiments.benchmark.timing import SessionTimes, degree_seconds, time_session
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.formats import read_pose_graph
@@ -45,7 +45,7 @@ class BenchmarkPlan:
     Attributes
     ----------
     sizes
-        Poses of generated graphs.
+        Poses of generated graphs. Without any, files alone are measured.
     files
         Pose graphs to read and optimise.
     num_actions
@@ -184,12 +184,12 @@ def run_benchmark(plan: BenchmarkPlan, *, progress: Progress = lambda _: None) -
         if graph.tangent_dim == 3 and name in {path.stem for path in plan.files}:
             graphs[name] = graph
         yield result
-    for size in plan.memory_sizes:
+    for size in plan.memory_sizes if plan.sizes else ():
         progress(f"memory at {size} poses")
         works = [peak_gigabytes(size, plan.num_actions, work, seed=plan.seed) for work in ("nothing", "bounds", "exact")]
         result = replace(result, memory=(*result.memory, PeakMemory(size, plan.num_actions, *works)))
         yield result
-    for closures in ("scattered", "bursts"):
+    for closures in get_args(ClosureStyle) if plan.sizes else ():
         progress(f"error bounds, closures {closures}")
         found = error_bounds(
             closures=closures,
