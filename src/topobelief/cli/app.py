@@ -11,6 +11,7 @@ import typer
 from topobelief.cli.benchmark import benchmark
 from topobelief.cli.info import info
 from topobelief.cli.plan import plan
+from topobelief.cli.reproduce import reproduce
 from topobelief.cli.simulate import simulate, simulate_compare
 from topobelief.cli.study import study, study_report
 from topobelief.errors import TopobeliefError
@@ -25,6 +26,7 @@ app = typer.Typer(name="topobelief", add_completion=False, pretty_exceptions_ena
 app.command()(plan)
 app.command()(info)
 app.command()(benchmark)
+app.command()(reproduce)
 app.command()(simulate)
 app.command()(simulate_compare)
 app.command()(study)

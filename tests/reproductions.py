@@ -1,0 +1,36 @@
+"""The smallest reproduction that has everything, measured once a process."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from functools import lru_cache
+from pathlib import Path
+
+from topobelief.experiments.reproduction import Reproduction, ReproductionPlan, reproduce
+
+SMALLEST = ReproductionPlan(
+    num_seeds=1,
+    num_bounds_seeds=1,
+    num_timed_seeds=1,
+    repetitions=1,
+    sizes=(20, 40),
+    num_random_graphs=2,
+    largest_spectrum=30,
+    num_length_paths=4,
+)
+
+
+_FOLDER = tempfile.TemporaryDirectory()
+
+
+@lru_cache(maxsize=1)
+def smallest_reproduction() -> Reproduction:
+    return reproduce(SMALLEST, Path(_FOLDER.name))
+
+
+def copy_of_smallest_reproduction(folder: Path) -> Reproduction:
+    """With all its files in the folder."""
+    found = smallest_reproduction()
+    shutil.copytree(_FOLDER.name, folder, dirs_exist_ok=True)
+    return found
