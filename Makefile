@@ -22,8 +22,8 @@ $(STAMP): pyproject.toml constraints.txt
 	touch $(STAMP)
 
 demo: install
-	$(BIN)/topobelief plan examples/office/office.g2o --map examples/office/office.csv --goal 25 -2.95 \
-	  --max-detour 2.5 --objective map --out out/demo
+	$(BIN)/topobelief plan examples/office/recorded.g2o --map examples/office/recorded.yaml --goal 25 -2.95 \
+	  --max-detour 2.5 --objective map --proof optimal --out out/demo
 
 test: install
 	$(BIN)/python -m pytest -n auto

@@ -34,6 +34,22 @@ def test_the_office_stays_between_its_walls():
     assert world.clearance([(25.0, -2.95)])[0] > 0.35
 
 
+def test_a_recorded_drive_can_be_planned_on():
+    """The graph is at its estimate and claims no less noise than it has, its poses are free in its map, and a goal is seen."""
+    graph, world = tb.read_g2o(OFFICE / "recorded.g2o"), tb.read_world(OFFICE / "recorded.yaml")
+    estimate = tb.optimize(graph)
+    assert 0.1 < graph.chi2 / graph.degrees_of_freedom < 1.2
+    np.testing.assert_allclose(graph.poses, estimate.poses, atol=1e-3)
+    assert world.clearance(graph.positions).min() > 0.15
+    goal = (25.0, -2.95)
+    roadmap = tb.build_roadmap(world, graph.poses[-1], goal)
+    paths = tb.diverse_paths(roadmap, graph.poses[-1], goal, num_paths=6, max_detour=2.5)
+    actions = tb.predict_actions(graph, paths, world=world)
+    decision = tb.Planner(graph, objective="map").decide(actions, proof="optimal")
+    assert decision.proven_optimal
+    assert decision.candidates[decision.best].num_closures == max(each.num_closures for each in decision.candidates)
+
+
 def test_the_code_in_the_readme_runs(monkeypatch, capsys):
     monkeypatch.chdir(ROOT)
     blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), flags=re.DOTALL)

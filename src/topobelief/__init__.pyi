@@ -21,6 +21,7 @@ from .io.g2o import write_g2o as write_g2o
 from .io.gtsam import from_gtsam as from_gtsam
 from .io.gtsam import to_gtsam as to_gtsam
 from .io.ros_map import read_ros_map as read_ros_map
+from .io.ros_map import write_ros_map as write_ros_map
 from .io.toro import read_toro as read_toro
 from .planning.decision import Decision as Decision
 from .planning.decision_quality import DecisionQuality as DecisionQuality

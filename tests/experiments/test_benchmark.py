@@ -10,12 +10,13 @@ from graphs import SE3_GROUP, Noise, random_pose_graph
 from topobelief import PoseGraph, joint_entropy, log_num_spanning_trees, posterior, von_neumann_entropy, write_g2o
 from topobelief.errors import InvalidInputError
 from topobelief.experiments.benchmark import run
-from topobelief.experiments.benchmark.baselines import baselines
+from topobelief.experiments.benchmark.baselines import Baseline, baselines
 from topobelief.experiments.benchmark.certificates import block_isotropic, error_bounds, proof_size
 from topobelief.experiments.benchmark.memory import peak_gigabytes
 from topobelief.experiments.benchmark.run import BenchmarkPlan, run_benchmark
 from topobelief.experiments.benchmark.sessions import BenchmarkSession, candidate_paths, city_drive
 from topobelief.experiments.benchmark.timing import MethodTime, SessionTimes, time_session
+from topobelief.report.benchmark_tables import session_table
 from topobelief.signatures.von_neumann import von_neumann_entropy_approx
 
 INFORMATION = block_isotropic(0.1, 0.035)
@@ -125,6 +126,28 @@ def test_a_session_is_timed_by_every_method_that_suits_its_size():
     assert (times.num_actions, times.num_new_poses) == (4, 10)
     large = city_drive(3600, INFORMATION, rng=np.random.default_rng(0))
     assert not any(large.num_poses <= method.largest_graph < math.inf for method in baselines())
+
+
+def test_a_method_that_fails_on_a_graph_is_reported_and_the_rest_goes_on():
+    def prepare(graph):
+        def ready(action):
+            raise RuntimeError("Indeterminate linear system detected while working near variable 7,\nand so on")
+
+        return ready
+
+    graph = city(40)
+    session = BenchmarkSession(
+        "hard", graph, candidate_paths(graph, 4, num_new_poses=5, num_closures=1, rng=np.random.default_rng(0))
+    )
+    failing = Baseline("standard BSP, GTSAM, COLAMD", "log det I", "standard", math.inf, prepare)
+    times = time_session(session, num_actions=2, repetitions=1, methods=[failing])
+    assert times.methods[0].note == "fails: Indeterminate linear system detected while working near variable 7"
+    assert len(times.methods) == 6
+    assert times.gtsam is times.best_from_scratch is None
+    result = run.BenchmarkResult(BenchmarkPlan(), {}, (times,))
+    row = json.loads(json.dumps(result.to_dict(), allow_nan=False))["sessions"][0]["methods"][0]
+    assert row["total"] is row["times_faster_than_gtsam"] is None
+    assert "fails" in " ".join(str(cell) for column in session_table(times, None).columns for cell in column.cells)
 
 
 def test_error_bounds_compare_the_families_on_the_same_candidates():

@@ -40,7 +40,7 @@ def test_a_run_shows_its_tracks(tmp_path):
     record = made_record()
     figure = draw_run(record)
     words = texts(figure)
-    assert "2 of 2 goals reached, 15 m, 8 key poses" in words
+    assert "2 of 2 goals reached, 15 m, 8 key poses; tracks laid on the true one" in words
     assert "physical noise, seed 3" in words
     for label in ("true track", "wheel odometry", "estimate", "loop closures (1)", "95 % of a position"):
         assert label in words

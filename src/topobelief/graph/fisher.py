@@ -65,7 +65,11 @@ class FisherRows:
         """I_rr: the rotations with all positions held; with equal noise w_r (L + xi^2 D)."""
         k, q = self.group.position_dim, self.group.rotation_dim
         rows_j = self.root[:, :, k:]
-        rows_i = self.root[:, :, :k] @ self.lever - rows_j
+        rows_i = -rows_j
+        if self.weights is not None:  # the root is diagonal
+            rows_i[:, :k] = np.sqrt(self.weights[0])[:, None, None] * self.lever
+        else:
+            rows_i += self.root[:, :, :k] @ self.lever
         magnitude_j = np.repeat(self.row_scale[:, 1:], q, 1)
         magnitude_i = magnitude_j + (self.row_scale[:, 0] * np.sqrt(self.squared_lengths()))[:, None]
         return EdgeForm(self.edges, rows_i, rows_j, magnitude_i, magnitude_j, self.root_error)

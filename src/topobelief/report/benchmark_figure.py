@@ -22,7 +22,7 @@ _LINES: tuple[tuple[str, str, str, str], ...] = (  # method, what the figure cal
     ("signature s_ST", "s_ST", style.PREDICTED_CLOSURE, "-"),
     ("signature ŝ_VN", "ŝ_VN", style.PREDICTED_CLOSURE, ":"),
 )
-_PLOT = (0.085, 0.115, 0.62, 0.74)  # of the figure
+_PLOT = (0.085, 0.115, 0.60, 0.74)  # of the figure
 _LABEL_HEIGHT = 0.155  # inches
 
 
@@ -40,7 +40,9 @@ def draw_benchmark(result: BenchmarkResult) -> Figure | None:
         axes.set_yscale("log")
         ends: list[tuple[float, str, str]] = []
         for method, name, colour, dashes in _LINES:
-            points = [(session.num_poses, row.total) for session in sessions if (row := _row(session, method)) is not None]
+            points = [
+                (session.num_poses, row.total) for session in sessions if (row := _row(session, method)) and row.num_timed
+            ]
             if points:
                 axes.plot(*zip(*points, strict=True), color=colour, linestyle=dashes, linewidth=1.4, marker="o", markersize=3)
                 if points[-1][0] == sessions[-1].num_poses:
@@ -52,7 +54,7 @@ def draw_benchmark(result: BenchmarkResult) -> Figure | None:
             axes.annotate(
                 f"{name}  {_seconds(value)}",
                 (right, value),
-                xytext=(right * 1.22, at),
+                xytext=(right * (right / sessions[0].num_poses) ** 0.04, at),
                 color=colour,
                 fontsize=8,
                 va="center",

@@ -15,6 +15,7 @@ from topobelief.graph.action import posterior
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.report import style
 from topobelief.report.canvas import Canvas, Entry, Panel
+from topobelief.report.study_figures import STRATEGY_NAMES
 from topobelief.simulation.comparison import ComparedRun, summarised
 from topobelief.simulation.metrics import aligned, chained, position_covariances, position_errors
 from topobelief.simulation.record import Deliberation, Record
@@ -147,11 +148,11 @@ def draw_comparison(runs: Sequence[ComparedRun], *, baseline: str) -> Figure:
             median = float(np.median(ratios))
             panel.line([(median, place - 0.34), (median, place + 0.34)], color=style.BEST, linewidth=2.2, zorder=5)
             y = 0.55 + height - (place + 0.5) * row - 0.04
-            canvas.text(left - 0.12, y, each.strategy.replace("_", " "), align="right", fontsize=8)
+            canvas.text(left - 0.12, y, _strategy(each.strategy), align="right", fontsize=8)
             canvas.text(left + width + 0.12, y, f"better in {each.share_better:.0%}", fontsize=8, color=style.MUTED)
         panel.axes.axvline(0, color=style.MUTED, linewidth=0.8, zorder=1)
         panel.axes.set_ylim(max(1, len(found)) - 0.5, -0.5)
-        panel.value_axis(f"error against {baseline.replace('_', ' ')} on the same seed (%)")
+        panel.value_axis(f"error against {_strategy(baseline)} on the same seed (%)")
         canvas.title(
             0.25,
             canvas.height - 0.42,
@@ -190,8 +191,8 @@ def _draw_ellipses(panel: Panel, graph: PoseGraph, poses: FloatArray) -> list[En
     angles = np.linspace(0, 2 * np.pi, 49)
     circle = np.stack([np.cos(angles), np.sin(angles)])
     driven = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(graph.positions, axis=0), axis=1))]
-    places = np.searchsorted(driven, np.linspace(driven[-1], 0, _ELLIPSES, endpoint=False) * (1 - 1e-9))
-    for index in np.unique(places).tolist():
+    stops = np.linspace(float(driven[-1]), 0.0, _ELLIPSES, endpoint=False) * (1 - 1e-9)
+    for index in sorted({int(place) for place in np.searchsorted(driven, stops)}):
         values, vectors = np.linalg.eigh(covariances[index])
         outline = poses[index, :2] + (vectors * _CONFIDENCE * np.sqrt(np.maximum(values, 0)) @ circle).T
         panel.line(outline, color=style.PREDICTED_CLOSURE, linewidth=0.9, zorder=6)
@@ -262,13 +263,16 @@ def _extent(tracks: Sequence[FloatArray], world: World) -> tuple[float, float, f
 def _title(record: Record) -> str:
     options = record.options
     noise = "physical noise" if options.noise is None else f"injected noise ξ = {options.noise.xi:g} rad/m"
-    strategy = options.strategy.replace("_", " ")
-    return f"{record.scenario.name}: {strategy}, {options.objective} entropy, {noise}, seed {options.seed}"
+    return f"{record.scenario.name}: {_strategy(options.strategy)}, {options.objective} entropy, {noise}, seed {options.seed}"
 
 
 def _subtitle(record: Record) -> str:
     goals = len(record.scenario.goals)
     return (
         f"{record.num_goals_reached} of {goals} goal{'s' if goals > 1 else ''} reached, "
-        f"{sum(leg.distance for leg in record.legs):.0f} m, {record.graph.num_poses} key poses"
+        f"{sum(leg.distance for leg in record.legs):.0f} m, {record.graph.num_poses} key poses; tracks laid on the true one"
     )
+
+
+def _strategy(name: str) -> str:
+    return STRATEGY_NAMES.get(name, name)

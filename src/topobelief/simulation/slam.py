@@ -145,7 +145,7 @@ class Slam:
 
     def occupancy(self) -> OccupancyMap:
         """The map by the scans so far at the estimate that the robot drives by."""
-        return OccupancyMap.from_scans(self.poses, self.scans, bounds=self._bounds)
+        return OccupancyMap.from_scans(self.poses, self.scans, bounds=self._bounds, previous=self._map)
 
     def _map_so_far(self, poses: FloatArray) -> OccupancyMap:
         if self._map is None or self._map_is_stale or len(poses) >= len(self._map.poses) + _MAP_PERIOD:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import platform
 from collections.abc import Callable, Iterator
@@ -135,6 +136,8 @@ class BenchmarkResult:
         document["plan"]["files"] = [path.name for path in self.plan.files]
         for session, values in zip(self.sessions, document["sessions"], strict=True):
             for method, row in zip(session.methods, values["methods"], strict=True):
+                for name in ("once", "per_action", "total"):
+                    row[name] = getattr(method, name) if method.num_timed else None
                 row["times_faster_than_gtsam"] = ratio(session.gtsam and session.gtsam.total, method.total)
                 best = session.best_from_scratch
                 row["times_faster_than_best_from_scratch"] = ratio(best and best.total, method.total)
@@ -143,7 +146,7 @@ class BenchmarkResult:
 
 def ratio(slow: float | None, fast: float) -> float | None:
     """How many times faster; None where there is nothing to compare with."""
-    return None if slow is None or fast <= 0 else slow / fast
+    return None if slow is None or not 0 < fast < math.inf else slow / fast
 
 
 def require_packages() -> None:
