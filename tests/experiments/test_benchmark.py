@@ -222,9 +222,3 @@ def test_ratios_are_of_whole_sessions():
 def test_a_plan_that_measures_nothing_is_refused(wrong):
     with pytest.raises(InvalidInputError, match=f"expected {next(iter(wrong))} of at least"):
         BenchmarkPlan(**wrong)
-
-
-def test_missing_packages_are_named(monkeypatch):
-    monkeypatch.setattr(run, "find_spec", lambda name: None if name == "gtsam" else object())
-    with pytest.raises(InvalidInputError, match=r"expected gtsam to be installed.*topobelief\[fast,gtsam\]"):
-        run.require_packages()

@@ -37,18 +37,19 @@ def benchmark(
     Other work on the machine distorts the figures. Needs the extras fast and gtsam.
     """
     from topobelief.cli.console import Reporter
+    from topobelief.cli.extras import require_extras
     from topobelief.cli.plan_files import checked_folder
 
+    require_extras("fast", "gtsam")
     reporter, folder = Reporter(as_json=as_json), checked_folder(out)
     with reporter.stage("start-up"):
         from topobelief.errors import FileError
-        from topobelief.experiments.benchmark.run import BenchmarkPlan, BenchmarkResult, require_packages, run_benchmark
+        from topobelief.experiments.benchmark.run import BenchmarkPlan, BenchmarkResult, run_benchmark
         from topobelief.io.files import atomic_file
         from topobelief.report.benchmark_figure import draw_benchmark
         from topobelief.report.benchmark_tables import benchmark_tables
         from topobelief.report.canvas import save_figure
 
-        require_packages()
     for path in graph_files or ():
         if not path.is_file():
             raise FileError(path, "expected a pose graph to read, got no such file")

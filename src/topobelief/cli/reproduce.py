@@ -33,16 +33,17 @@ def reproduce(
     two cores with nothing else to do. Needs the extras fast, gtsam and page.
     """
     from topobelief.cli.console import Reporter
+    from topobelief.cli.extras import require_extras
 
+    require_extras("fast", "gtsam", "page")
     reporter = Reporter(as_json=as_json)
     with reporter.stage("start-up"):
         from topobelief.cli import reproduction_files
         from topobelief.cli.plan_files import checked_folder
-        from topobelief.experiments.reproduction import ReproductionPlan, require_packages
+        from topobelief.experiments.reproduction import ReproductionPlan
         from topobelief.experiments.reproduction import reproduce as run
         from topobelief.report.reproduction.claims_table import claims_table
 
-        require_packages("plotly")
     folder = out or Path("out") / ("reproduction-quick" if quick else "reproduction")
     checked_folder(folder)
     files = tuple(graph_files or ())

@@ -54,7 +54,9 @@ def simulate(
     Ctrl-C leaves a complete result of what was driven, from which --resume continues.
     """
     from topobelief.cli.console import Reporter
+    from topobelief.cli.extras import require_extras
 
+    require_extras("sim")
     reporter = Reporter(as_json=as_json)
     with reporter.stage("start-up"):
         from topobelief.cli import simulation_files
@@ -134,7 +136,9 @@ def simulate_compare(
     All earlier sessions of a seed are driven once, so that the strategies decide on the same graph.
     """
     from topobelief.cli.console import Reporter
+    from topobelief.cli.extras import require_extras
 
+    require_extras("sim")
     reporter = Reporter(as_json=as_json)
     with reporter.stage("start-up"):
         from topobelief.cli import comparison_files

@@ -11,7 +11,6 @@ import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Generic, TypeVar, cast
 
@@ -169,26 +168,6 @@ class Reproduction:
         object.__setattr__(self, "claims", claims(self.actions, self.times, self.random_graphs))
 
 
-def require_packages(*extra: str) -> None:
-    """Check that what the experiments use is installed.
-
-    Parameters
-    ----------
-    extra
-        Further packages to look for, such as "plotly".
-
-    Raises
-    ------
-    InvalidInputError
-        Says what to install.
-    """
-    missing = [package for package in ("numba", "gtsam", *extra) if find_spec(package) is None]
-    if missing:
-        raise InvalidInputError(
-            f"expected {' and '.join(missing)} to be installed, got none; run pip install 'topobelief[fast,gtsam,page]'"
-        )
-
-
 def experiments(plan: ReproductionPlan) -> tuple[Experiment[Any], ...]:
     """All of them, in the order in which they run: what is timed comes first, while the machine is cool."""
     seeds = range(plan.seed, plan.seed + plan.num_seeds)
@@ -281,7 +260,6 @@ def reproduce(plan: ReproductionPlan, folder: Path, *, progress: Progress = lamb
     FileError
         Where it cannot be written to, or a pose graph cannot be read.
     """
-    require_packages()
     for path in plan.files:
         if not path.is_file():
             raise FileError(path, "expected a pose graph to read, got no such file")

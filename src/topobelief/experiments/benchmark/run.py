@@ -8,7 +8,6 @@ import platform
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
-from importlib.util import find_spec
 from itertools import product
 from pathlib import Path
 from typing import Any, get_args
@@ -147,21 +146,6 @@ class BenchmarkResult:
 def ratio(slow: float | None, fast: float) -> float | None:
     """How many times faster; None where there is nothing to compare with."""
     return None if slow is None or not 0 < fast < math.inf else slow / fast
-
-
-def require_packages() -> None:
-    """Check that what the benchmark compares is installed.
-
-    Raises
-    ------
-    InvalidInputError
-        Says what to install.
-    """
-    missing = [package for package in ("numba", "gtsam") if find_spec(package) is None]
-    if missing:
-        raise InvalidInputError(
-            f"expected {' and '.join(missing)} to be installed, got none; run pip install 'topobelief[fast,gtsam]'"
-        )
 
 
 def run_benchmark(plan: BenchmarkPlan, *, progress: Progress = lambda _: None) -> Iterator[BenchmarkResult]:
