@@ -13,7 +13,8 @@ from topobelief.experiments.benchmark.sessions import candidate_paths, city_driv
 from topobelief.graph.action import check_actions
 from topobelief.graph.fisher import fisher_rows
 from topobelief.linalg.edge_form import laplacian_form
-from topobelief.linalg.elimination_paths import EliminationTree, FormFactor
+from topobelief.linalg.elimination_paths import FormFactor
+from topobelief.linalg.elimination_tree import EliminationTree
 from topobelief.linalg.increments import log_det_increments
 from topobelief.planning.action_batch import ActionBatch
 from topobelief.signatures.degree_increments import DegreeEntropy

@@ -12,7 +12,8 @@ from graphs import connected_topologies, path, pose_graphs, star
 from references import laplacian_log_det_exact, log_det_exact
 from topobelief.graph.fisher import fisher_rows
 from topobelief.linalg import EdgeForm, LogDetSolver, elimination_paths, laplacian_form
-from topobelief.linalg.elimination_paths import EliminationTree, FormFactor
+from topobelief.linalg.elimination_paths import FormFactor
+from topobelief.linalg.elimination_tree import EliminationTree
 
 seeds = st.integers(0, 2**32 - 1)
 

@@ -13,7 +13,8 @@ from topobelief.graph.action import posterior
 from topobelief.graph.fisher import fisher_rows
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg import increments as increments_module
-from topobelief.linalg.elimination_paths import EliminationTree, FormFactor
+from topobelief.linalg.elimination_paths import FormFactor
+from topobelief.linalg.elimination_tree import EliminationTree
 from topobelief.linalg.extensions import Extensions
 from topobelief.linalg.increments import diagonal_increments, log_det_increments
 from topobelief.planning.action_batch import ActionBatch

@@ -15,7 +15,8 @@ from topobelief.graph.fisher import FisherRows, fisher_rows
 from topobelief.graph.information import SAME_NOISE
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg import EdgeForm, LogDet, LogDetSolver, laplacian_form
-from topobelief.linalg.elimination_paths import EliminationTree, FormFactor, KnownColumns, changed_nodes
+from topobelief.linalg.elimination_paths import FormFactor, KnownColumns, changed_nodes
+from topobelief.linalg.elimination_tree import EliminationTree
 from topobelief.linalg.increments import Increments, diagonal_increments, log_det_increments
 from topobelief.linalg.log_det import UNIT_ROUNDOFF
 from topobelief.planning.action_batch import ActionBatch, scalar_weights_of
