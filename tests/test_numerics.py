@@ -174,6 +174,22 @@ def test_each_part_has_a_covered_error(noise, num_poses, num_extra, seed):
         assert abs(float(Decimal(hadamard.value) - blocks)) <= hadamard.error
 
 
+@pytest.mark.parametrize("log_ratio", [4, 5, 6, 7, 8])
+def test_hadamard_is_not_refused_where_cholesky_answers(log_ratio):
+    """The diagonal blocks of a corridor in space are as badly conditioned as the whole; their rows are not."""
+    rng = np.random.default_rng(log_ratio)
+    for _ in range(4):
+        poses = np.column_stack([np.outer(np.arange(4), [4.0, 3.0, 2.0]), np.tile([0.0, 0.0, 0.0, 1.0], (4, 1))])
+        information = np.diag([1.0] * 3 + [10.0 ** (-2 * log_ratio)] * 3) * 10.0 ** rng.uniform(-2, 2, (5, 1, 1))
+        graph = PoseGraph(poses, [(0, 1), (1, 2), (2, 3), (3, 0), (0, 2)], None, information)
+        try:
+            entropy_bounds(graph, determinant="cholesky")
+        except IllConditionedError:
+            continue
+        entropy_bounds(graph, determinant="hadamard")
+        assert_covered(graph)
+
+
 # Long graphs whose roundings repeat ----------------------------------------------------------------------------------------
 
 
@@ -239,6 +255,15 @@ def test_absurd_lengths_are_measured_or_refused(length):
     """Squares of lengths overflow: an error of ours, not a floating-point warning."""
     graph = PoseGraph([[0, 0, 0], [length, 0, 0], [0, length, 0]], [(0, 1), (1, 2), (2, 0)], None, np.eye(3))
     assert_covered(graph)
+
+
+@pytest.mark.parametrize("quantity", [joint_entropy_estimate, entropy_bounds])
+def test_a_refusal_never_says_nan(quantity):
+    graph = PoseGraph([[0, 0, 0], [1e300, 0, 0], [0, 1e300, 0]], [(0, 1), (1, 2), (2, 0)], None, np.eye(3))
+    with pytest.raises(IllConditionedError, match="rounding leaves no digit") as refusal:
+        quantity(graph)
+    assert refusal.value.error_estimate == math.inf
+    assert "nan" not in str(refusal.value)
 
 
 def test_absurd_ratios_within_a_matrix_are_measured_or_refused():

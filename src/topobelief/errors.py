@@ -6,6 +6,7 @@ and then what to do. The values that it names are attributes too, so that a prog
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from os import PathLike, fspath
 
@@ -94,9 +95,11 @@ class IllConditionedError(TopobeliefError, ArithmeticError):
 
     def __init__(self, what: str, error_estimate: float) -> None:
         self.what = what
-        self.error_estimate = error_estimate
+        self.error_estimate = math.inf if math.isnan(error_estimate) else error_estimate
+        known = math.isfinite(self.error_estimate)
+        loss = f"estimated error {error_estimate:.1e} nats" if known else "rounding leaves no digit"
         super().__init__(
-            f"{what}: the graph is too ill-conditioned for double precision (estimated error {error_estimate:.1e} nats); "
+            f"{what}: the graph is too ill-conditioned for double precision ({loss}); "
             "check the units and the information matrices for extreme ratios"
         )
 

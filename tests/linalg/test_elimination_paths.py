@@ -5,13 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from graphs import connected_topologies, path, pose_graphs, star
 from references import laplacian_log_det_exact, log_det_exact
 from topobelief.graph.fisher import fisher_rows
-from topobelief.linalg import EdgeForm, LogDetSolver, elimination_paths, laplacian_form
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.linalg import EdgeForm, LogDetSolver, elimination_paths, laplacian_form, strong_rows
 from topobelief.linalg.elimination_paths import FormFactor
 from topobelief.linalg.elimination_tree import EliminationTree
 
@@ -31,14 +32,18 @@ def held_forms(draw):
     return topology.num_nodes, form, int(rng.integers(topology.num_nodes))
 
 
-def dense_matrix(num_nodes, form, held):
-    """R^T R without the held node's variables, nodes in their own order."""
+def dense_rows(num_nodes, form, held):
+    """R without the held node's variables, nodes in their own order."""
     m, r, b = form.rows_i.shape
     rows = np.zeros((m, r, num_nodes, b))
     for edge, (i, j) in enumerate(form.edges.tolist()):
         rows[edge, :, i] += form.rows_i[edge]
         rows[edge, :, j] += form.rows_j[edge]
-    rows = np.delete(rows, held, axis=2).reshape(m * r, (num_nodes - 1) * b)
+    return np.delete(rows, held, axis=2).reshape(m * r, (num_nodes - 1) * b)
+
+
+def dense_matrix(num_nodes, form, held):
+    rows = dense_rows(num_nodes, form, held)
     return rows.T @ rows
 
 
@@ -158,3 +163,52 @@ def test_paths_do_not_depend_on_the_number_of_threads(monkeypatch, cores):
     expected = factor.paths(places).values
     monkeypatch.setattr(elimination_paths, "num_threads", lambda: cores)
     np.testing.assert_array_equal(factor.paths(places).values, expected)
+
+
+@given(held_forms(), st.integers(1, 4), st.floats(2.0, 5.0), seeds)
+def test_with_strong_rows_last_the_factor_is_that_of_the_same_matrix(drawn, count, decades, seed):
+    num_nodes, form, held = drawn
+    if len(form.edges) < 3:
+        return
+    rng = np.random.default_rng(seed)
+    strength = np.ones((len(form.edges), form.rows_i.shape[1], 1))
+    strength[rng.integers(len(form.edges), size=count), rng.integers(form.rows_i.shape[1], size=count)] = 10**decades
+    columns = np.max(strength, axis=1)
+    form = EdgeForm(
+        form.edges, strength * form.rows_i, strength * form.rows_j, columns * form.magnitude_i, columns * form.magnitude_j
+    )
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(strong_rows, "_STRONG", 100.0)
+        factor = FormFactor.with_strong_rows_last(form.edges, num_nodes, held, form)
+    if factor is None or num_nodes == 1:
+        return
+    plain = FormFactor.of(EliminationTree.build(form.edges, num_nodes, held), form)
+    assert factor.log_det.value == pytest.approx(plain.log_det.value, abs=factor.log_det.error + plain.log_det.error)
+    inverse, b, order = np.linalg.pinv(dense_rows(num_nodes, form, held)), form.block_size, factor.tree.order
+    inverse = inverse @ inverse.T
+    order = order - (order > held)
+    paths = factor.paths(np.arange(num_nodes - 1))
+    scale = np.abs(inverse).max()
+    for s in range(num_nodes - 1):
+        for t in range(num_nodes - 1):
+            block = inverse[b * order[s] : b * order[s] + b, b * order[t] : b * order[t] + b]
+            np.testing.assert_allclose(paths.inverse_block(s, t), block, rtol=1e-6, atol=1e-6 * scale)
+
+
+@settings(max_examples=40)
+@given(pose_graphs(min_poses=3, max_poses=7, max_extra=6, log_ratio=(-1.0, 1.0)), st.floats(2.0, 13.0), seeds)
+def test_strong_rows_last_cost_no_digits(graph, decades, seed):
+    """Against 80 digits."""
+    rng = np.random.default_rng(seed)
+    information = graph.information.copy()
+    information[rng.integers(graph.num_edges, size=2)] *= 10**decades
+    graph = PoseGraph(graph.poses, graph.edges, None, information)
+    rows, held = fisher_rows(graph), int(rng.integers(graph.num_poses))
+    for name in ("joint", "positions", "rotations", "rotations_given_positions"):
+        form = getattr(rows, name)()
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(strong_rows, "_STRONG", 10.0)
+            factor = FormFactor.with_strong_rows_last(graph.edges, graph.num_poses, held, form)
+        if factor is not None and math.isfinite(factor.log_det.error):
+            exact = float(log_det_exact(graph, name, held=held)) / form.multiplicity
+            assert factor.log_det.value == pytest.approx(exact, rel=1e-15, abs=factor.log_det.error)

@@ -30,10 +30,10 @@ def fischer_bounds(rows: FisherRows, solver: LogDetSolver, *, hadamard: bool) ->
     hadamard
         Replace ln det I_rr by the sum over its diagonal blocks: looser, and one factorisation less.
     """
-    positions = solver.gauge_free_log_det(rows.positions())
+    positions = solver.log_det(rows.positions())
     ratio = rows.weight_ratio()
     if ratio is None:
-        lower = positions + solver.gauge_free_log_det(rows.rotations_given_positions())
+        lower = positions + solver.log_det(rows.rotations_given_positions())
     else:  # L_r|p is a multiple of I_pp's Laplacian
         k, q = rows.group.position_dim, rows.group.rotation_dim
         lower = ((k + q) / k * positions).plus(q * solver.num_free * math.log(ratio))

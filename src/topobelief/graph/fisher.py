@@ -49,7 +49,7 @@ class FisherRows:
         magnitude_j = np.concatenate([np.repeat(scale_p, k, 1), np.repeat(scale_r, self.group.rotation_dim, 1)], axis=1)
         magnitude_i = magnitude_j.copy()
         magnitude_i[:, k:] += scale_p * np.sqrt(self.squared_lengths())[:, None]
-        return EdgeForm(self.edges, rows_i, root, magnitude_i, magnitude_j, self.root_error)
+        return EdgeForm(self.edges, rows_i, root, magnitude_i, magnitude_j, self.root_error, gauge_free=True)
 
     def positions(self) -> EdgeForm:
         """I_pp: the positions with all rotations held; a scalar Laplacian w_p L where the noise allows."""
@@ -58,7 +58,7 @@ class FisherRows:
             return laplacian_form(self.edges, self.weights[0], multiplicity=k)
         root = self.root[:, :k, :k]
         magnitude = np.repeat(self.row_scale[:, :1], k, 1)
-        return EdgeForm(self.edges, -root, root, magnitude, magnitude, self.root_error)
+        return EdgeForm(self.edges, -root, root, magnitude, magnitude, self.root_error, gauge_free=True)
 
     @_may_overflow
     def rotations(self) -> EdgeForm:
@@ -81,7 +81,7 @@ class FisherRows:
             return laplacian_form(self.edges, self.weights[1], multiplicity=q)
         root = self.root[:, k:, k:]
         magnitude = np.repeat(self.row_scale[:, 1:], q, 1)
-        return EdgeForm(self.edges, -root, root, magnitude, magnitude, self.root_error)
+        return EdgeForm(self.edges, -root, root, magnitude, magnitude, self.root_error, gauge_free=True)
 
     def joined(self, more: FisherRows) -> FisherRows:
         """These edges and then the others', of the same nodes."""

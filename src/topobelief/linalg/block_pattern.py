@@ -109,11 +109,40 @@ class BlockPattern:
         pulled = np.concatenate([form.rows_i.transpose(0, 2, 1) @ values, form.rows_j.transpose(0, 2, 1) @ values])
         return (self.diagonal_sum @ pulled.reshape(len(pulled), -1)).reshape(self.size, values.shape[2])
 
+    def scattered(self, edges: IntArray, rows_i: FloatArray, rows_j: FloatArray) -> FloatArray:
+        """Single rows on all free variables, dense.
+
+        Parameters
+        ----------
+        edges : shape (s,)
+            The edge of each row.
+        rows_i, rows_j : shape (s, b)
+            The row on the variables of both ends.
+
+        Returns
+        -------
+        array, shape (s, size)
+        """
+        num_edges = self.diagonal_sum.shape[1] // 2
+        place = np.full(2 * num_edges, -1)
+        node, slot = self.diagonal_sum.tocoo().coords
+        place[slot] = node
+        dense = np.zeros((len(edges), self.size // self.block_size, self.block_size))
+        for at, rows in ((place[edges], rows_i), (place[edges + num_edges], rows_j)):
+            free = np.flatnonzero(at >= 0)
+            dense[free, at[free]] += rows[free]
+        return dense.reshape(len(edges), self.size)
+
     def dense_rows(self, form: EdgeForm) -> FloatArray:
         """All rows on all free variables, dense, shape (m r, size)."""
         num_edges, r, b = form.rows_i.shape
-        dense = np.zeros((num_edges, r, self.size // b if b else 0, b))
-        node, slot = self.diagonal_sum.tocoo().coords
-        ends = np.concatenate([form.rows_i, form.rows_j])
-        dense[slot % num_edges, :, node] = ends[slot]
-        return dense.reshape(num_edges * r, self.size)
+        edges = np.repeat(np.arange(num_edges), r)
+        return self.scattered(edges, form.rows_i.reshape(-1, b), form.rows_j.reshape(-1, b))
+
+    def rows_at(self, form: EdgeForm, node: int) -> tuple[FloatArray, FloatArray]:
+        """All rows on the variables of one free node, shape (d r, b), and what `magnitude` says of them, shape (b,)."""
+        slots = self.diagonal_sum.indices[self.diagonal_sum.indptr[node] : self.diagonal_sum.indptr[node + 1]]
+        edges, at_j = np.divmod(slots, len(form.edges))[::-1]
+        rows = np.where(at_j[:, None, None], form.rows_j[edges], form.rows_i[edges])
+        magnitudes = np.where(at_j[:, None], form.magnitude_j[edges], form.magnitude_i[edges])
+        return rows.reshape(-1, self.block_size), np.sum(magnitudes**2, axis=0)

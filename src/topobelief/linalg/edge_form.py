@@ -8,7 +8,7 @@ half of the digits, so whoever needs them all (QR, increments) can start from th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,6 +31,9 @@ class EdgeForm:
         What rounding in the square roots of the noise adds to the error of the log-determinant, nats.
     multiplicity
         The matrix meant is M kron I_multiplicity.
+    gauge_free
+        Whether the rows do not see a motion of all nodes together. Then it does not matter for ln det which one node is held,
+        and ln det is a sum over blocks (docs, the mathematics, section 10).
     """
 
     edges: IntArray
@@ -40,11 +43,29 @@ class EdgeForm:
     magnitude_j: FloatArray
     root_error: float = 0.0
     multiplicity: int = 1
+    gauge_free: bool = False
 
     @property
     def block_size(self) -> int:
         """b, variables per node."""
         return self.rows_i.shape[2]
+
+    def between(self, which: IntArray, edges: IntArray) -> EdgeForm:
+        """The rows of some edges, between nodes of other numbers.
+
+        Parameters
+        ----------
+        which : shape (m',)
+        edges : shape (m', 2)
+        """
+        return replace(
+            self,
+            edges=edges,
+            rows_i=self.rows_i[which],
+            rows_j=self.rows_j[which],
+            magnitude_i=self.magnitude_i[which],
+            magnitude_j=self.magnitude_j[which],
+        )
 
     def strongest_node(self) -> int:
         """The node with the largest sum of squared rows: holding it leaves the best conditioned matrix."""
@@ -66,4 +87,4 @@ def laplacian_form(edges: IntArray, weights: FloatArray, *, multiplicity: int = 
         Copies of the Laplacian on the diagonal.
     """
     root = np.sqrt(weights)[:, None]
-    return EdgeForm(edges, -root[..., None], root[..., None], root, root, multiplicity=multiplicity)
+    return EdgeForm(edges, -root[..., None], root[..., None], root, root, multiplicity=multiplicity, gauge_free=True)

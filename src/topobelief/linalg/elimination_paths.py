@@ -31,6 +31,8 @@ from topobelief.linalg.compiled import compiled, in_parallel, num_threads
 from topobelief.linalg.edge_form import EdgeForm
 from topobelief.linalg.elimination_tree import EliminationTree, with_ancestors
 from topobelief.linalg.log_det import UNIT_ROUNDOFF, LogDet
+from topobelief.linalg.orthogonal import triangle_of_more_rows
+from topobelief.linalg.strong_rows import StrongRows
 
 _EXACT_VARIANCE_SIZE = 200  # the constants of log_det's estimate
 _NUM_PROBES = 8
@@ -117,10 +119,56 @@ class FormFactor:
         error = UNIT_ROUNDOFF * error + form.root_error
         return FormFactor(tree, diagonal, blocks, LogDet(factor.log_det.value, error if math.isfinite(error) else math.inf))
 
+    @staticmethod
+    @np.errstate(over="ignore", divide="ignore", invalid="ignore")
+    def with_strong_rows_last(
+        edges: IntArray, num_nodes: int, held: int, form: EdgeForm, *, shift: float = 0.0
+    ) -> FormFactor | None:
+        """The factor where a few rows are far stronger than the others, which they do not drown.
+
+        The nodes of the strong rows come last. M_0, in which these rows are weakened, is factored; then what they lack is added to
+        the dense part of the factor by orthogonal triangles. None where no rows are that strong, or too many.
+
+        Parameters
+        ----------
+        edges, num_nodes, held
+            As for `EliminationTree.build`.
+        form, shift
+        """
+        strong = StrongRows.of(form)
+        if strong is None:
+            return None
+        tree = EliminationTree.build(edges, num_nodes, held, last=np.unique(edges[strong.edge]))
+        others = FormFactor.of(tree, strong.weakened, shift=shift)
+        if not math.isfinite(others.log_det.error):
+            return None
+        return others._with_more_rows(strong)
+
     @property
     def block_size(self) -> int:
         """b."""
         return self.diagonal.shape[1]
+
+    def _with_more_rows(self, strong: StrongRows) -> FormFactor:
+        """This factor with the strong rows' lacks added to the last nodes, whose part is dense."""
+        tree, b = self.tree, self.block_size
+        num_last = np.count_nonzero(tree.position[np.unique(tree.edges[strong.edge])] >= 0)
+        first = tree.num_free - num_last
+        triangle, rows, sizes = np.zeros((num_last * b, num_last * b)), *_on_last_nodes(tree, strong, first)
+        nodes = triangle.reshape(num_last, b, num_last, b)
+        for j in range(first, tree.num_free):
+            nodes[j - first, :, j - first] = self.diagonal[j]
+            nodes[j - first + 1 :, :, j - first] = self.blocks[tree.start[j] : tree.start[j + 1]]
+        triangle, error = triangle_of_more_rows(triangle, rows, sizes)
+        nodes = triangle.reshape(num_last, b, num_last, b)
+        diagonal, blocks = self.diagonal.copy(), self.blocks.copy()
+        for j in range(first, tree.num_free):
+            diagonal[j] = nodes[j - first, :, j - first]
+            blocks[tree.start[j] : tree.start[j + 1]] = nodes[j - first + 1 :, :, j - first]
+        log_pivots = 2 * np.log(np.diagonal(diagonal, axis1=1, axis2=2)).ravel()
+        error = self.log_det.error + UNIT_ROUNDOFF * (error + float(np.abs(log_pivots).sum()))
+        value = math.fsum(log_pivots) if math.isfinite(error) else math.nan
+        return FormFactor(tree, diagonal, blocks, LogDet(value, error if math.isfinite(error) else math.inf))
 
     def paths(self, places: IntArray) -> Paths:
         """Paths of some places, given in ascending order and without repetition.
@@ -186,6 +234,17 @@ class FormFactor:
             samples += math.sqrt(shift) * _random_signs(rng, samples.shape)
         solve(tree.start, tree.rows, self.diagonal, self.blocks, samples)
         return _PROBE_SAFETY / _NUM_PROBES * np.sum(samples**2, axis=2)
+
+
+def _on_last_nodes(tree: EliminationTree, strong: StrongRows, first: int) -> tuple[FloatArray, FloatArray]:
+    """What strong rows lack, and the sizes of the terms behind that, on the variables of the places from `first` on."""
+    places = tree.position[tree.edges[strong.edge]] - first
+    b = strong.rows_i.shape[1]
+    rows, sizes = np.zeros((2, len(places), tree.num_free - first, b))
+    for at, part, size in zip(places.T, (strong.rows_i, strong.rows_j), (strong.sizes_i, strong.sizes_j), strict=True):
+        free = np.flatnonzero(at >= 0)
+        rows[free, at[free]], sizes[free, at[free]] = part[free], size[free]
+    return rows.reshape(len(places), -1), sizes.reshape(len(places), -1)
 
 
 class KnownColumns(NamedTuple):

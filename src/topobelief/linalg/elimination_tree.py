@@ -49,22 +49,29 @@ class EliminationTree:
     num_appended: int = 0
 
     @staticmethod
-    def build(edges: IntArray, num_nodes: int, held: int) -> EliminationTree:
+    def build(edges: IntArray, num_nodes: int, held: int, *, last: IntArray | None = None) -> EliminationTree:
         """Order all nodes but the one that is held.
 
         Parameters
         ----------
         edges : shape (m, 2)
         num_nodes, held
+        last
+            Nodes that come last, and whose part of the factor is dense. Default: none.
         """
-        free = np.flatnonzero(np.arange(num_nodes) != held)
-        if len(free) == 0:
-            return EliminationTree.of_order(edges, num_nodes, free)
-        _, _, order = _QDLDL.Solver(_any_upper(edges, num_nodes, free), upper=True).factors()
-        return EliminationTree.of_order(edges, num_nodes, free[np.asarray(order, dtype=np.int64)])
+        is_free = np.arange(num_nodes) != held
+        last = np.zeros(0, np.int64) if last is None else last[is_free[last]]
+        is_free[last] = False
+        free = np.flatnonzero(is_free)
+        if len(free):
+            _, _, order = _QDLDL.Solver(_any_upper(edges, num_nodes, free), upper=True).factors()
+            free = free[np.asarray(order, dtype=np.int64)]
+        return EliminationTree.of_order(edges, num_nodes, np.concatenate([free, last]), num_dense=len(last))
 
     @staticmethod
-    def of_order(edges: IntArray, num_nodes: int, order: IntArray, *, num_appended: int = 0) -> EliminationTree:
+    def of_order(
+        edges: IntArray, num_nodes: int, order: IntArray, *, num_appended: int = 0, num_dense: int = 0
+    ) -> EliminationTree:
         """The tree of a given order, which becomes a postorder with the same factor.
 
         Parameters
@@ -74,10 +81,14 @@ class EliminationTree:
         order
             Free nodes.
         num_appended
+        num_dense
+            How many of the last nodes have a dense part of the factor; the postorder keeps their places.
         """
         edges, position = edges.copy(), np.full(num_nodes, -1)
         position[order] = np.arange(len(order))
-        start, rows = _factor_pattern(edges, position, len(order))
+        dense = order[len(order) - num_dense :]
+        star = np.stack([np.full(num_dense, dense[0] if num_dense else -1), dense], axis=1)[1:]
+        start, rows = _factor_pattern(np.concatenate([edges, star]), position, len(order))
         postorder = _postorder(_parents(start, rows))
         start, rows = _permuted(start, rows, postorder)
         order = order[postorder]

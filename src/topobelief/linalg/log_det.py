@@ -9,38 +9,47 @@ u sqrt(B_i B_j), B the magnitude of the terms added. |(M^-1)_ij| <= v_i v_j with
 sampled on large ones (M^-1 R^T z has covariance M^-1 for random signs z). Where roundings repeat themselves, as on graphs
 whose edges are all alike, they add up instead of averaging out; the sums of M_ii v_i^2 and B_i v_i^2 stand for that.
 
-Where the estimate is too large, Householder QR of the rows themselves takes over on graphs that are small enough for a
-dense matrix: it does not square the condition number.
+Where the estimate is too large, what can be had without a factor is taken apart first, and the smallest estimate wins: the
+graph falls into its blocks, bridges among them, if the form allows it (`blocks`); rows that are far stronger than the others
+are added afterwards (`strong_rows`); and Householder QR of the rows themselves, which does not square the condition number,
+serves what is small enough for a dense matrix.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import qdldl
-from scipy import linalg, sparse
+from scipy import sparse
 
 from topobelief.arrays import BoolArray, FloatArray, IntArray
 from topobelief.errors import IllConditionedError
 from topobelief.linalg.block_pattern import BlockPattern
+from topobelief.linalg.blocks import CutGraph
 from topobelief.linalg.edge_form import EdgeForm
+from topobelief.linalg.orthogonal import ASSEMBLY_OPERATIONS, UNIT_ROUNDOFF, log_det_by_qr, log_dets_of_squares
+from topobelief.linalg.strong_rows import StrongRows, log_det_of_covariance
 
 MAX_ERROR_NATS = 0.1
 """An entropy or a signature that is not known to this is refused: it could not rank candidates."""
 
 _QDLDL: Any = qdldl  # ships no types
-UNIT_ROUNDOFF = float(np.finfo(np.float64).eps) / 2
 _EXACT_VARIANCE_SIZE = 200  # up to here the variances of the error estimate are exact
 _NUM_PROBES = 8
 _PROBE_SAFETY = 2.0  # eight probes underestimate one variance by more than this in few cases, a sum of them in fewer
 _CONFIDENCE = 4.0  # standard deviations of the rounding error that the estimate covers
-_QR_SIZE = 1200  # up to here a dense QR takes a fraction of a second
-_QR_RELATIVE_ERROR = 1e-8  # beyond it the QR is worth its time
-_HOLD_STRONGEST_ERROR = 1e-6  # nats; below it one more factorisation would not be seen
-_ASSEMBLY_OPERATIONS = 16  # roundings behind one term of a block
+_SMALL_ERROR = 1e-6  # nats; below it one more factorisation would not be seen
+_WHOLE_SHARE = 0.9  # of the edges: a block with more is as good as the graph
+_LARGE_ERROR = 1e-4  # nats; beyond it solutions for strong rows are worth their time, and a QR that takes seconds
+_SMALL_RELATIVE_ERROR = 1e-8  # beyond it a QR that takes milliseconds is worth its time
+_SMALL_QR_SIZE = 200
+_QR_SIZE = 1200
+_SMALL_NODE_ERROR = 1e-8  # nats; beyond it the QR of a node's rows is worth its time
+_OPERATIONS = 32  # roundings behind one term of the covariance of strong rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +83,8 @@ class LogDet:
     def plus(self, constant: float) -> LogDet:
         """A constant added, with the rounding that the sum costs."""
         value = self.value + constant
+        if not math.isfinite(value):
+            return _UNKNOWN
         return LogDet(value, self.error + UNIT_ROUNDOFF * (abs(constant) + abs(self.value) + abs(value)))
 
 
@@ -98,6 +109,7 @@ class LogDetSolver:
         self._free[held] = False
         self._patterns: dict[int, BlockPattern] = {}
         self._factors: dict[int, Any] = {}
+        self._cut: CutGraph | None = None
 
     @property
     def num_free(self) -> int:
@@ -110,24 +122,13 @@ class LogDetSolver:
 
         0 where there are no free nodes; error inf where the factorisation breaks down.
         """
-        pattern = self._pattern(form.block_size)
-        if pattern.size == 0:
+        if self._pattern(form.block_size).size == 0:
             return LogDet(0.0, 0.0)
-        result = self._by_factor(form, pattern, shift)
-        if result.error > _QR_RELATIVE_ERROR * max(1.0, abs(result.value)) and pattern.size <= _QR_SIZE:
-            result = min(result, _by_qr(form, pattern, shift), key=lambda candidate: candidate.error)
+        result, blocks = self._by_sparse_factors(form, shift), None
+        if result.error > _SMALL_ERROR and form.gauge_free and not shift:
+            blocks = self._by_blocks(form)
+        result = self._or_by_qr(result, form, shift) if blocks is None else _better(result, blocks)
         return form.multiplicity * result
-
-    def gauge_free_log_det(self, form: EdgeForm) -> LogDet:
-        """ln det of a form for which it does not matter which one node is held (docs, the mathematics, section 4).
-
-        Where rounding matters, the node with the strongest rows is held instead of the solver's.
-        """
-        here = self.log_det(form)
-        if here.error <= _HOLD_STRONGEST_ERROR:
-            return here
-        elsewhere = LogDetSolver(self._edges, len(self._free), form.strongest_node()).log_det(form)
-        return min(here, elsewhere, key=lambda candidate: candidate.error)
 
     @_may_overflow
     def hadamard(self, form: EdgeForm, *, shift: float = 0.0) -> LogDet:
@@ -138,21 +139,88 @@ class LogDetSolver:
         blocks = pattern.diagonal_blocks(form) + shift * np.eye(form.block_size)
         scale = np.sqrt(np.diagonal(blocks, axis1=1, axis2=2))
         scaled = blocks / (scale[:, :, None] * scale[:, None, :])
-        log_dets = np.linalg.slogdet(scaled)[1] + 2 * np.log(scale).sum(axis=1)
-        if not np.isfinite(log_dets).all():  # a block is singular in double precision
-            return _UNKNOWN
-        value = math.fsum(log_dets)
+        values = np.linalg.slogdet(scaled)[1] + 2 * np.log(scale).sum(axis=1)
         ratio = pattern.magnitude(form).reshape(scale.shape) / scale**2
         condition = np.linalg.cond(scaled, "fro") * ratio.max(axis=1)
-        error = UNIT_ROUNDOFF * float(_ASSEMBLY_OPERATIONS * form.block_size * condition.sum() + np.abs(log_dets).sum())
-        return form.multiplicity * (LogDet(value, error) if math.isfinite(error) else _UNKNOWN)
+        errors = UNIT_ROUNDOFF * (ASSEMBLY_OPERATIONS * form.block_size * condition + np.abs(values))
+        known = np.isfinite(values) & np.isfinite(errors)
+        values, errors = np.where(known, values, np.nan), np.where(known, errors, np.inf)
+        root_error = 0.0  # rows know nothing of it
+        for node in np.flatnonzero(errors > _SMALL_NODE_ERROR):
+            better = _by_qr(*pattern.rows_at(form, node), shift)
+            if better.error < errors[node]:
+                values[node], errors[node] = better.value, better.error
+                root_error = 2 * form.root_error  # an edge is seen at both ends
+        return form.multiplicity * _finite(LogDet(math.fsum(values), float(errors.sum()) + root_error))
 
     def _pattern(self, block_size: int) -> BlockPattern:
         if block_size not in self._patterns:
             self._patterns[block_size] = BlockPattern.build(self._edges, self._free, block_size)
         return self._patterns[block_size]
 
-    def _by_factor(self, form: EdgeForm, pattern: BlockPattern, shift: float) -> LogDet:
+    def _by_sparse_factors(self, form: EdgeForm, shift: float) -> LogDet:
+        """By one factor, and with strong rows apart where the error makes that worth its time."""
+        factor = self._factor(form, shift)
+        known = _UNKNOWN if factor is None else factor.log_det
+        return known if known.error <= _LARGE_ERROR else _better(known, self._by_strong_rows(form, shift))
+
+    def _by_blocks(self, form: EdgeForm) -> LogDet | None:
+        """The sum over the blocks of the graph, the strongest node of each held where there is a choice.
+
+        None where the graph is hardly more than one block that holds the same node.
+        """
+        if self._cut is None:
+            self._cut = CutGraph.of(self._edges, self._free)
+        cut = self._cut
+        if not cut.is_grounded:
+            return _UNKNOWN
+        held = cut.held_nodes(form)
+        largest = np.argmax(np.bincount(cut.block_of_node))
+        if cut.node[held[largest]] == len(self._free) and np.mean(cut.block_of_edge == largest) > _WHOLE_SHARE:
+            return None
+        rows = replace(form.between(cut.kept, cut.edges), root_error=0.0)
+        apart = cut.is_bridge & (form.rows_i.shape[1] == form.block_size)
+        value, error = log_dets_of_squares(*_rows_at_free_ends(rows, held[cut.block_of_edge], apart))
+        total = LogDet(value, UNIT_ROUNDOFF * error + form.root_error)
+        rest = np.flatnonzero(~apart)
+        if len(rest) == 0:
+            return _finite(total)
+        solver, part = _part(rows, rest, held)
+        known = solver._by_sparse_factors(part, 0.0)
+        if known.error > _SMALL_ERROR:
+            known = LogDet(0.0, 0.0)
+            for block in np.split(rest, _changes(cut.block_of_edge[rest])):
+                solver, part = _part(rows, block, held)
+                known += solver._or_by_qr(solver._by_sparse_factors(part, 0.0), part, 0.0)
+        return _finite(total + known)
+
+    def _or_by_qr(self, known: LogDet, form: EdgeForm, shift: float) -> LogDet:
+        """`known`, or what is known better by QR, as far as the error makes that worth its time."""
+        pattern = self._pattern(form.block_size)
+        limit = _LARGE_ERROR
+        if pattern.size <= _SMALL_QR_SIZE:
+            limit = _SMALL_RELATIVE_ERROR * max(1.0, abs(known.value))
+        if pattern.size <= _QR_SIZE and not known.error <= limit:
+            by_qr = _by_qr(pattern.dense_rows(form), pattern.magnitude(form), shift)
+            known = _better(known, LogDet(by_qr.value, by_qr.error + form.root_error))
+        return known
+
+    def _by_strong_rows(self, form: EdgeForm, shift: float) -> LogDet:
+        """The other rows factored, the strong ones added to that."""
+        pattern, strong = self._pattern(form.block_size), StrongRows.of(form)
+        others = None if strong is None else self._factor(strong.weakened, shift)
+        if strong is None or others is None:
+            return _UNKNOWN
+        rows = pattern.scattered(strong.edge, strong.rows_i, strong.rows_j)
+        sizes = pattern.scattered(strong.edge, strong.sizes_i, strong.sizes_j)
+        solutions = np.stack([others.solve(row) for row in rows], axis=1)
+        value, error = log_det_of_covariance(rows, sizes, solutions, np.sqrt(others.variances))
+        error = UNIT_ROUNDOFF * (_OPERATIONS * error + abs(value))
+        return _finite(LogDet(others.log_det.value + value, 2 * others.log_det.error + error))
+
+    def _factor(self, form: EdgeForm, shift: float) -> _Factor | None:
+        """None where a pivot is not positive, or nothing is known of the error."""
+        pattern = self._pattern(form.block_size)
         upper = pattern.upper(form, shift=shift)
         try:
             if pattern.block_size in self._factors:
@@ -161,16 +229,60 @@ class LogDetSolver:
                 self._factors[pattern.block_size] = _QDLDL.Solver(upper, upper=True)
         except RuntimeError:  # a zero pivot
             self._factors.pop(pattern.block_size, None)
-            return _UNKNOWN
+            return None
         factor = self._factors[pattern.block_size]
         lower, pivots, order = _factor_parts(factor)
         if not (pivots > 0).all():
-            return _UNKNOWN
+            return None
         log_pivots = np.log(pivots)
         variances = _variances(factor, form, pattern, shift)
         error = _factor_error(upper, lower, order, pattern.magnitude(form), variances, form.block_size)
         error = UNIT_ROUNDOFF * (error + float(np.abs(log_pivots).sum())) + form.root_error
-        return LogDet(math.fsum(log_pivots), error) if math.isfinite(error) else _UNKNOWN
+        return _Factor(LogDet(math.fsum(log_pivots), error), variances, factor.solve) if math.isfinite(error) else None
+
+
+@dataclass(frozen=True, slots=True)
+class _Factor:
+    """What is known of a factored matrix M."""
+
+    log_det: LogDet
+    variances: FloatArray  # diag M^-1, estimated
+    solve: Callable[[FloatArray], FloatArray]  # until the solver factors another matrix
+
+
+def _better(first: LogDet, second: LogDet) -> LogDet:
+    return min(first, second, key=lambda candidate: candidate.error)
+
+
+def _finite(estimate: LogDet) -> LogDet:
+    return estimate if math.isfinite(estimate.value) and math.isfinite(estimate.error) else _UNKNOWN
+
+
+def _by_qr(rows: FloatArray, magnitudes: FloatArray, shift: float) -> LogDet:
+    """ln det (R^T R + shift I), `magnitudes` the squared sizes of the terms behind each column."""
+    if shift:
+        rows = np.concatenate([rows, math.sqrt(shift) * np.eye(rows.shape[1])])
+    value, error = log_det_by_qr(rows, np.sqrt(magnitudes))
+    return _finite(LogDet(value, UNIT_ROUNDOFF * error))
+
+
+def _rows_at_free_ends(form: EdgeForm, held: IntArray, which: BoolArray) -> tuple[FloatArray, FloatArray]:
+    """Rows and magnitudes of some edges at their ends that are not held; `held`, shape (m,), has the node that is."""
+    at_i = (form.edges[:, 1] == held)[which]
+    rows = np.where(at_i[:, None, None], form.rows_i[which], form.rows_j[which])
+    return rows, np.where(at_i[:, None], form.magnitude_i[which], form.magnitude_j[which])
+
+
+def _part(form: EdgeForm, which: IntArray, held: IntArray) -> tuple[LogDetSolver, EdgeForm]:
+    """A form of some edges alone, its nodes numbered anew, and its solver."""
+    nodes, edges = np.unique(form.edges[which], return_inverse=True)
+    edges = edges.reshape(-1, 2)
+    return LogDetSolver(edges, len(nodes), np.flatnonzero(np.isin(nodes, held))), form.between(which, edges)
+
+
+def _changes(values: IntArray) -> IntArray:
+    """Places at which a sorted array takes another value."""
+    return np.flatnonzero(np.diff(values)) + 1
 
 
 def _factor_parts(factor: Any) -> tuple[sparse.csc_array, FloatArray, IntArray]:
@@ -215,38 +327,7 @@ def _factor_error(
     squares = float((operations * ordered) @ (2 * (structure @ ordered) + ordered))
     pattern = sparse.csc_array((np.ones(upper.nnz), upper.indices, upper.indptr), shape=upper.shape)
     coupled: FloatArray = pattern @ assembled  # pyright: ignore[reportAssignmentType]  (a vector: the stubs allow more)
-    squares += _ASSEMBLY_OPERATIONS * block_size * 2 * float(assembled @ coupled)
+    squares += ASSEMBLY_OPERATIONS * block_size * 2 * float(assembled @ coupled)
     return 2 * float(factored.sum() + assembled.sum()) + _CONFIDENCE * math.sqrt(2 * squares)
 
 
-def _by_qr(form: EdgeForm, pattern: BlockPattern, shift: float) -> LogDet:
-    """2 ln |det R| of the rows, columns scaled to unit norm, largest rows first, columns pivoted."""
-    rows = pattern.dense_rows(form)
-    if shift:
-        rows = np.concatenate([rows, math.sqrt(shift) * np.eye(pattern.size)])
-    if len(rows) < pattern.size or not np.isfinite(rows).all():
-        return _UNKNOWN
-    norms = np.linalg.norm(rows, axis=0)
-    if not (norms > 0).all():
-        return _UNKNOWN
-    scaled = rows / norms
-    scaled = scaled[np.argsort(-np.abs(scaled).max(axis=1), kind="stable")]
-    triangle, permutation = _pivoted_qr(scaled)
-    diagonal = np.abs(np.diagonal(triangle))
-    if diagonal.min() <= UNIT_ROUNDOFF:
-        return _UNKNOWN
-    inverse = linalg.solve_triangular(triangle, np.eye(pattern.size))
-    standard_deviations = np.empty(pattern.size)
-    standard_deviations[permutation] = np.linalg.norm(inverse, axis=1)
-    ratio = np.sqrt(pattern.magnitude(form)) / norms
-    relative = math.sqrt(pattern.size) + _ASSEMBLY_OPERATIONS * ratio
-    log_diagonal = np.log(diagonal)
-    value = 2 * (math.fsum(log_diagonal) + math.fsum(np.log(norms)))
-    error = 2 * UNIT_ROUNDOFF * float(relative @ standard_deviations + np.abs(log_diagonal).sum() + np.abs(np.log(norms)).sum())
-    return LogDet(value, error + form.root_error)
-
-
-def _pivoted_qr(matrix: FloatArray) -> tuple[FloatArray, IntArray]:
-    parts: Any = linalg.qr(matrix, mode="r", pivoting=True)
-    triangle, permutation = parts
-    return triangle[: matrix.shape[1]], permutation

@@ -25,10 +25,11 @@ FormName = Literal["trees_p", "trees_r", "positions", "rotations", "rotations_gi
 """Laplacians with the weights w_p and w_r; I_pp, I_rr, L_r|p and I in blocks."""
 
 _HOLD_STRONGEST_ERROR = 1e-6  # nats; below it one more factorisation would not be seen
+_STRONG_ROWS_ERROR = 1e-4  # nats; beyond it one more factorisation with strong rows last is worth its time
 _APPENDED_SHARE = 0.2  # of the longest path: poses that may follow an old order before a new one pays
 _LARGEST_ERROR = 1.0  # nats; a factor that knows less is none
-_QR_SIZE = 1200  # up to here an evaluation from scratch may do better, by QR, than an untrustworthy factor
-_QR_RELATIVE_ERROR = 1e-8
+_QR_SIZE = 1200  # up to here an evaluation from scratch may do better, by QR, than a factor
+_QR_ERROR = 1e-3  # nats; only beyond it is that worth its time
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -115,6 +116,7 @@ class PriorForms:
         self._trees: dict[int, EliminationTree] = {}
         self._bases: dict[int, EliminationTree] = {}  # of the trees that keep an order
         self._factors: dict[tuple[FormName, float], FormFactor] = {}
+        self._strong_factors: dict[tuple[FormName, float], FormFactor] = {}
         self._earlier = earlier
         if earlier is not None:
             earlier._earlier = None
@@ -144,7 +146,18 @@ class PriorForms:
         """The factor of a form plus `shift` times I.
 
         Where it does not matter which pose is held but rounding does, the one with the strongest rows is, if that is better.
+        Where that is not enough, strong rows come last.
         """
+        factor = self._plain_factor(name, shift)
+        if not factor.log_det.error <= _STRONG_ROWS_ERROR and (name, shift) not in self._strong_factors:
+            form = form_of(name, self)
+            edges, num_nodes = self.graph.edges, self.graph.num_poses
+            apart = FormFactor.with_strong_rows_last(edges, num_nodes, factor.tree.held, form, shift=shift)
+            if apart is not None and apart.log_det.error < factor.log_det.error:
+                self._strong_factors[name, shift] = apart
+        return self._strong_factors.get((name, shift), factor)
+
+    def _plain_factor(self, name: FormName, shift: float) -> FormFactor:
         if (name, shift) not in self._factors:
             form, invariant = form_of(name, self), not (name == "rotations" or shift)
             old = None if self._earlier is None else self._earlier._factors.pop((name, shift), None)
@@ -217,7 +230,7 @@ class PosteriorForms:
             increments = log_det_increments(factor, self.batch.extensions, form_of(name, self.batch), shift=shift, split=split)
             value, error = factor.log_det.value, 2 * factor.log_det.error
             small = factor.tree.num_free * factor.block_size <= _QR_SIZE
-            if not error <= (_QR_RELATIVE_ERROR * max(1.0, abs(value)) if small else _LARGEST_ERROR):
+            if not error <= (_QR_ERROR if small else _LARGEST_ERROR):
                 value = math.nan
             known = self._known[name, shift] = FormLogDets(value, error, increments)
         return known

@@ -1,0 +1,116 @@
+"""ln det of Gram matrices from their rows, small and dense, without forming them: the condition number is not squared.
+
+Errors are in units of roundoff, to first order: where rows are off by E, ln det (R^T R) moves by 2 tr(R^+ E), and the norm of
+the c-th row of R^+ is the standard deviation of variable c.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from scipy import linalg
+
+from topobelief.arrays import FloatArray, IntArray
+
+UNIT_ROUNDOFF = float(np.finfo(np.float64).eps) / 2
+ASSEMBLY_OPERATIONS = 16  # roundings behind one term of a row
+
+
+def log_det_by_qr(rows: FloatArray, magnitudes: FloatArray) -> tuple[float, float]:
+    """2 ln |det R|, columns scaled to unit norm, largest rows first, columns pivoted; with its error in units of roundoff.
+
+    Parameters
+    ----------
+    rows : shape (m, n)
+    magnitudes : shape (n,)
+        Size of the terms from which each column was computed.
+
+    Returns
+    -------
+    nan and inf where the rows do not have full rank in double precision.
+    """
+    size = rows.shape[1]
+    if len(rows) < size or not np.isfinite(rows).all():
+        return math.nan, math.inf
+    norms = np.linalg.norm(rows, axis=0)
+    if not (norms > 0).all():
+        return math.nan, math.inf
+    scaled = rows / norms
+    scaled = scaled[np.argsort(-np.abs(scaled).max(axis=1), kind="stable")]
+    triangle, permutation = _pivoted_qr(scaled)
+    diagonal = np.abs(np.diagonal(triangle))
+    if diagonal.min() <= UNIT_ROUNDOFF:
+        return math.nan, math.inf
+    inverse = linalg.solve_triangular(triangle, np.eye(size))
+    deviations = np.empty(size)
+    deviations[permutation] = np.linalg.norm(inverse, axis=1)
+    relative = math.sqrt(size) + ASSEMBLY_OPERATIONS * magnitudes / norms
+    logarithms = np.concatenate([np.log(diagonal), np.log(norms)])
+    error = 2 * float(relative @ deviations + np.abs(logarithms).sum())
+    return 2 * math.fsum(logarithms), error
+
+
+def log_dets_of_squares(rows: FloatArray, magnitudes: FloatArray) -> tuple[float, float]:
+    """Sum of 2 ln |det R_e| over square R_e, rows and columns scaled to unit norm; with its error in units of roundoff.
+
+    Parameters
+    ----------
+    rows : shape (m, b, b)
+    magnitudes : shape (m, b)
+
+    Returns
+    -------
+    nan and inf where some R_e is singular in double precision.
+    """
+    if len(rows) == 0:
+        return 0.0, 0.0
+    b = rows.shape[1]
+    heights = np.linalg.norm(rows, axis=2)
+    scaled = rows / heights[:, :, None]
+    norms = np.linalg.norm(scaled, axis=1)
+    scaled = scaled / norms[:, None, :]
+    if not np.isfinite(scaled).all():
+        return math.nan, math.inf
+    log_dets = np.linalg.slogdet(scaled)[1]
+    if not np.isfinite(log_dets).all():
+        return math.nan, math.inf
+    inverse = np.abs(np.linalg.inv(scaled))  # of R without its scales: R^-1 = N^-1 S^-1 H^-1
+    deviations = np.linalg.norm(inverse / heights[:, None, :], axis=2) / norms
+    logarithms = np.concatenate([log_dets, np.log(heights).ravel(), np.log(norms).ravel()])
+    error = ASSEMBLY_OPERATIONS * np.sum(deviations * magnitudes) + b * np.sum(inverse) + np.abs(logarithms).sum()
+    return 2 * math.fsum(logarithms), 2 * float(error)
+
+
+def triangle_of_more_rows(triangle: FloatArray, rows: FloatArray, sizes: FloatArray) -> tuple[FloatArray, float]:
+    """L' with L' L'^T = L L^T + A^T A, and the error of ln det (L' L'^T) in units of roundoff.
+
+    Parameters
+    ----------
+    triangle : shape (n, n)
+        L, lower.
+    rows, sizes : shape (s, n)
+        A and the sizes of the terms behind its entries.
+
+    Returns
+    -------
+    nan and inf where rounding left no positive diagonal.
+    """
+    stacked = np.concatenate([triangle.T, rows])
+    stacked = stacked[np.argsort(-np.abs(stacked).max(axis=1), kind="stable")]
+    more: FloatArray = np.linalg.qr(stacked, mode="r")
+    diagonal = np.diagonal(more)
+    if not (np.isfinite(more).all() and (diagonal != 0).all()):
+        return np.full_like(triangle, np.nan), math.inf
+    more = more * np.sign(diagonal)[:, None]
+    deviations = np.linalg.norm(linalg.solve_triangular(more, np.eye(len(more))), axis=1)
+    norms = np.linalg.norm(stacked, axis=0)
+    relative = math.sqrt(len(more)) * norms + ASSEMBLY_OPERATIONS * np.linalg.norm(sizes, axis=0)
+    return more.T, 2 * float(relative @ deviations)
+
+
+def _pivoted_qr(matrix: FloatArray) -> tuple[FloatArray, IntArray]:
+    parts: Any = linalg.qr(matrix, mode="r", pivoting=True)
+    triangle, permutation = parts
+    return triangle[: matrix.shape[1]], permutation
