@@ -66,7 +66,12 @@ def test_nodes_that_no_held_node_reaches_are_noticed():
 
 
 @given(
-    st.sampled_from([SE2_GROUP, SE3_GROUP]), st.sampled_from(NOISES), st.integers(2, 9), st.integers(0, 4), st.integers(1, 3), seeds
+    st.sampled_from([SE2_GROUP, SE3_GROUP]),
+    st.sampled_from(NOISES),
+    st.integers(2, 9),
+    st.integers(0, 4),
+    st.integers(1, 3),
+    seeds,
 )
 def test_the_sum_over_blocks_is_the_log_determinant(group, kind, num_poses, num_extra, num_held, seed):
     """Of I, I_pp and L_r|p, whatever is held; bridges, parallel edges and several held poses among them."""

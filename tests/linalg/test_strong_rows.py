@@ -62,8 +62,8 @@ def test_what_strong_rows_lack_completes_their_gram_matrix():
     for rows, weakened, lacking in ends:
         for edge in range(graph.num_edges):
             more = lacking[strong.edge == edge]
-            gram = rows[edge].T @ rows[edge]
-            assert np.allclose(weakened[edge].T @ weakened[edge] + more.T @ more, gram, rtol=1e-12, atol=1e-9 * np.abs(gram).max())
+            gram, total = rows[edge].T @ rows[edge], weakened[edge].T @ weakened[edge] + more.T @ more
+            assert np.allclose(total, gram, rtol=1e-12, atol=1e-12 * np.abs(gram).max())
 
 
 @pytest.mark.parametrize("weights", [np.ones(5), np.array([1.0, 1.0, 1e12, 1e12, 1e12])], ids=["alike", "mostly strong"])

@@ -141,8 +141,9 @@ class BlockPattern:
 
     def rows_at(self, form: EdgeForm, node: int) -> tuple[FloatArray, FloatArray]:
         """All rows on the variables of one free node, shape (d r, b), and what `magnitude` says of them, shape (b,)."""
-        slots = self.diagonal_sum.indices[self.diagonal_sum.indptr[node] : self.diagonal_sum.indptr[node + 1]]
-        edges, at_j = np.divmod(slots, len(form.edges))[::-1]
+        start, stop = self.diagonal_sum.indptr[node : node + 2]
+        slots: IntArray = np.asarray(self.diagonal_sum.indices[start:stop], dtype=np.int64)
+        edges, at_j = slots % len(form.edges), slots >= len(form.edges)
         rows = np.where(at_j[:, None, None], form.rows_j[edges], form.rows_i[edges])
         magnitudes = np.where(at_j[:, None], form.magnitude_j[edges], form.magnitude_i[edges])
         return rows.reshape(-1, self.block_size), np.sum(magnitudes**2, axis=0)

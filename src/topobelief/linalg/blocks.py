@@ -3,7 +3,7 @@
 A block is a largest set of edges any two of which lie on a common cycle, or a single edge (a bridge), parallel edges counted
 as one. Blocks share no more than one node with each other, their cut nodes. Of a form for which it does not matter which
 node is held (`EdgeForm.gauge_free`), ln det is the sum over the blocks, one node of each held (docs, the mathematics,
-section 10). Found by depth-first search (Hopcroft and Tarjan, Algorithm 447, Comm. ACM 16, 1973).
+section 4). Found by depth-first search (Hopcroft and Tarjan, Algorithm 447, Comm. ACM 16, 1973).
 """
 
 from __future__ import annotations

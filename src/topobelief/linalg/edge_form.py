@@ -33,7 +33,7 @@ class EdgeForm:
         The matrix meant is M kron I_multiplicity.
     gauge_free
         Whether the rows do not see a motion of all nodes together. Then it does not matter for ln det which one node is held,
-        and ln det is a sum over blocks (docs, the mathematics, section 10).
+        and ln det is a sum over blocks (docs, the mathematics, section 4).
     """
 
     edges: IntArray

@@ -124,10 +124,10 @@ class FormFactor:
     def with_strong_rows_last(
         edges: IntArray, num_nodes: int, held: int, form: EdgeForm, *, shift: float = 0.0
     ) -> FormFactor | None:
-        """The factor where a few rows are far stronger than the others, which they do not drown.
+        """The factor where a few rows are so much stronger than the others that rounding them would drown these.
 
-        The nodes of the strong rows come last. M_0, in which these rows are weakened, is factored; then what they lack is added to
-        the dense part of the factor by orthogonal triangles. None where no rows are that strong, or too many.
+        The nodes of the strong rows come last. M_0, in which these rows are weakened, is factored; then what they lack is
+        added to the dense part of the factor by orthogonal triangles. None where no rows are that strong, or too many.
 
         Parameters
         ----------
@@ -152,7 +152,7 @@ class FormFactor:
     def _with_more_rows(self, strong: StrongRows) -> FormFactor:
         """This factor with the strong rows' lacks added to the last nodes, whose part is dense."""
         tree, b = self.tree, self.block_size
-        num_last = np.count_nonzero(tree.position[np.unique(tree.edges[strong.edge])] >= 0)
+        num_last = int(np.count_nonzero(tree.position[np.unique(tree.edges[strong.edge])] >= 0))
         first = tree.num_free - num_last
         triangle, rows, sizes = np.zeros((num_last * b, num_last * b)), *_on_last_nodes(tree, strong, first)
         nodes = triangle.reshape(num_last, b, num_last, b)

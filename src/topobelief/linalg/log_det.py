@@ -146,7 +146,7 @@ class LogDetSolver:
         known = np.isfinite(values) & np.isfinite(errors)
         values, errors = np.where(known, values, np.nan), np.where(known, errors, np.inf)
         root_error = 0.0  # rows know nothing of it
-        for node in np.flatnonzero(errors > _SMALL_NODE_ERROR):
+        for node in np.flatnonzero(errors > _SMALL_NODE_ERROR).tolist():
             better = _by_qr(*pattern.rows_at(form, node), shift)
             if better.error < errors[node]:
                 values[node], errors[node] = better.value, better.error
@@ -192,7 +192,7 @@ class LogDetSolver:
             for block in np.split(rest, _changes(cut.block_of_edge[rest])):
                 solver, part = _part(rows, block, held)
                 known += solver._or_by_qr(solver._by_sparse_factors(part, 0.0), part, 0.0)
-        return _finite(total + known)
+        return _finite(total.plus(known.value) + LogDet(0.0, known.error))
 
     def _or_by_qr(self, known: LogDet, form: EdgeForm, shift: float) -> LogDet:
         """`known`, or what is known better by QR, as far as the error makes that worth its time."""
@@ -329,5 +329,3 @@ def _factor_error(
     coupled: FloatArray = pattern @ assembled  # pyright: ignore[reportAssignmentType]  (a vector: the stubs allow more)
     squares += ASSEMBLY_OPERATIONS * block_size * 2 * float(assembled @ coupled)
     return 2 * float(factored.sum() + assembled.sum()) + _CONFIDENCE * math.sqrt(2 * squares)
-
-

@@ -76,10 +76,10 @@ def log_dets_of_squares(rows: FloatArray, magnitudes: FloatArray) -> tuple[float
     log_dets = np.linalg.slogdet(scaled)[1]
     if not np.isfinite(log_dets).all():
         return math.nan, math.inf
-    inverse = np.abs(np.linalg.inv(scaled))  # of R without its scales: R^-1 = N^-1 S^-1 H^-1
+    inverse: FloatArray = np.asarray(np.linalg.inv(scaled), dtype=np.float64)  # of R without its scales: R^-1 = N^-1 S^-1 H^-1
     deviations = np.linalg.norm(inverse / heights[:, None, :], axis=2) / norms
     logarithms = np.concatenate([log_dets, np.log(heights).ravel(), np.log(norms).ravel()])
-    error = ASSEMBLY_OPERATIONS * np.sum(deviations * magnitudes) + b * np.sum(inverse) + np.abs(logarithms).sum()
+    error = ASSEMBLY_OPERATIONS * np.sum(deviations * magnitudes) + b * np.sum(np.abs(inverse)) + np.abs(logarithms).sum()
     return 2 * math.fsum(logarithms), 2 * float(error)
 
 
@@ -99,7 +99,8 @@ def triangle_of_more_rows(triangle: FloatArray, rows: FloatArray, sizes: FloatAr
     """
     stacked = np.concatenate([triangle.T, rows])
     stacked = stacked[np.argsort(-np.abs(stacked).max(axis=1), kind="stable")]
-    more: FloatArray = np.linalg.qr(stacked, mode="r")
+    parts: Any = linalg.qr(stacked, mode="r")
+    more: FloatArray = parts[0][: stacked.shape[1]]
     diagonal = np.diagonal(more)
     if not (np.isfinite(more).all() and (diagonal != 0).all()):
         return np.full_like(triangle, np.nan), math.inf
