@@ -7,6 +7,7 @@ with the held (anchored) nodes left out. Parallel edges add into one block.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -141,8 +142,8 @@ class BlockPattern:
 
     def rows_at(self, form: EdgeForm, node: int) -> tuple[FloatArray, FloatArray]:
         """All rows on the variables of one free node, shape (d r, b), and what `magnitude` says of them, shape (b,)."""
-        start, stop = self.diagonal_sum.indptr[node : node + 2]
-        slots: IntArray = np.asarray(self.diagonal_sum.indices[start:stop], dtype=np.int64)
+        ends: Any = self.diagonal_sum  # its stubs do not say what its arrays are
+        slots: IntArray = ends.indices[ends.indptr[node] : ends.indptr[node + 1]]
         edges, at_j = slots % len(form.edges), slots >= len(form.edges)
         rows = np.where(at_j[:, None, None], form.rows_j[edges], form.rows_i[edges])
         magnitudes = np.where(at_j[:, None], form.magnitude_j[edges], form.magnitude_i[edges])
