@@ -7,7 +7,6 @@ with the held (anchored) nodes left out. Parallel edges add into one block.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -137,13 +136,13 @@ class BlockPattern:
     def dense_rows(self, form: EdgeForm) -> FloatArray:
         """All rows on all free variables, dense, shape (m r, size)."""
         num_edges, r, b = form.rows_i.shape
-        edges = np.repeat(np.arange(num_edges), r)
+        edges = np.arange(num_edges * r) // r
         return self.scattered(edges, form.rows_i.reshape(-1, b), form.rows_j.reshape(-1, b))
 
     def rows_at(self, form: EdgeForm, node: int) -> tuple[FloatArray, FloatArray]:
         """All rows on the variables of one free node, shape (d r, b), and what `magnitude` says of them, shape (b,)."""
-        ends: Any = self.diagonal_sum  # its stubs do not say what its arrays are
-        slots: IntArray = ends.indices[ends.indptr[node] : ends.indptr[node + 1]]
+        start, stop = self.diagonal_sum.indptr[node : node + 2]
+        slots: IntArray = np.asarray(self.diagonal_sum.indices[start:stop], dtype=np.int64)
         edges, at_j = slots % len(form.edges), slots >= len(form.edges)
         rows = np.where(at_j[:, None, None], form.rows_j[edges], form.rows_i[edges])
         magnitudes = np.where(at_j[:, None], form.magnitude_j[edges], form.magnitude_i[edges])
