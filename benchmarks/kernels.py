@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from topobelief.planning.action_batch import ActionBatch
+from topobelief.signatures.degree_increments import DegreeEntropy
 
 from topobelief.experiments.benchmark.certificates import block_isotropic
 from topobelief.experiments.benchmark.sessions import candidate_paths, city_drive
@@ -16,8 +18,6 @@ from topobelief.linalg.edge_form import laplacian_form
 from topobelief.linalg.elimination_paths import FormFactor
 from topobelief.linalg.elimination_tree import EliminationTree
 from topobelief.linalg.increments import log_det_increments
-from topobelief.planning.action_batch import ActionBatch
-from topobelief.signatures.degree_increments import DegreeEntropy
 
 HELD = 9_999
 RNG = np.random.default_rng(0)

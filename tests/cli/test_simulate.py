@@ -11,12 +11,12 @@ from typing import get_args
 
 import numpy as np
 import pytest
+from topobelief.planning.objectives import ObjectiveName
 
 from topobelief.cli.interruption import stop_on_interrupt
 from topobelief.cli.simulate import Objective
 from topobelief.io.g2o import read_g2o
 from topobelief.io.ros_map import read_ros_map
-from topobelief.planning.objectives import ObjectiveName
 
 ROOM = """map: walls.csv
 start: [1.5, 1.5]

@@ -15,12 +15,12 @@ from typing import get_args
 import numpy as np
 import pytest
 from scipy import stats
+from topobelief.planning.evaluation import SignatureName
+from topobelief.planning.objectives import ObjectiveName
 
 from topobelief import errors
 from topobelief.bounds.entropy_bounds import Determinant, Family
 from topobelief.planning.decision import Decision
-from topobelief.planning.evaluation import SignatureName
-from topobelief.planning.objectives import ObjectiveName
 from topobelief.planning.planner import Proof
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from topobelief.planning.action_batch import ActionBatch
 
 from graphs import NOISES, SE2_GROUP, SE3_GROUP, Noise, random_action, random_pose_graph, sessions
 from references import log_det_exact, log_det_reference
@@ -17,7 +18,6 @@ from topobelief.linalg.elimination_paths import FormFactor
 from topobelief.linalg.elimination_tree import EliminationTree
 from topobelief.linalg.extensions import Extensions
 from topobelief.linalg.increments import diagonal_increments, log_det_increments
-from topobelief.planning.action_batch import ActionBatch
 
 PARTS = ("joint", "positions", "rotations", "rotations_given_positions")
 seeds = st.integers(0, 2**32 - 1)

@@ -4,13 +4,13 @@ import importlib
 import pkgutil
 
 import numpy as np
+from topobelief.planning.incremental import IncrementalEvaluation
 
 import topobelief.linalg
 import topobelief.signatures
 from graphs import NOISES, SE2_GROUP, SE3_GROUP, Noise, random_action, random_pose_graph
 from topobelief.graph.action import posterior
 from topobelief.planning.compile_kernels import compile_kernels
-from topobelief.planning.incremental import IncrementalEvaluation
 
 
 def compiled_signatures():

@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from topobelief.planning.action_batch import ActionBatch
+from topobelief.planning.evaluation import ScratchEvaluation
+from topobelief.planning.incremental import IncrementalEvaluation
 
 from data_files import data_file
 from graphs import SE2_GROUP, SE3_GROUP, Noise, random_action, random_pose_graph, sessions, shares_isotropic_noise
@@ -14,9 +17,6 @@ from topobelief.graph.fisher import fisher_rows
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.g2o import read_g2o
 from topobelief.planning import incremental, posterior_forms
-from topobelief.planning.action_batch import ActionBatch
-from topobelief.planning.evaluation import ScratchEvaluation
-from topobelief.planning.incremental import IncrementalEvaluation
 
 OBJECTIVES = ("joint", "map", "per_pose")
 SIGNATURES = ("spanning_trees", "von_neumann", "von_neumann_approx")

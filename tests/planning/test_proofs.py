@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from topobelief.planning.evaluation import ScratchEvaluation
 
 from graphs import NOISES, SE2_GROUP, SE3_GROUP, Noise, random_action, random_pose_graph
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning import planner as planner_module
-from topobelief.planning.evaluation import ScratchEvaluation
 from topobelief.planning.planner import Planner
 
 SESSIONS_A_TEST = 250

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from topobelief.signatures.degree_increments import DegreeEntropy
 
 from graphs import connected_topologies
 from topobelief.graph.topology import Topology
-from topobelief.signatures.degree_increments import DegreeEntropy
 from topobelief.signatures.von_neumann import von_neumann_entropy_approx
 
 

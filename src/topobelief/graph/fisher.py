@@ -22,7 +22,7 @@ from topobelief.geometry import Group
 from topobelief.graph.information import SAME_NOISE, isotropic_weights, shared_information
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg.edge_form import EdgeForm, laplacian_form
-from topobelief.linalg.log_det import UNIT_ROUNDOFF
+from topobelief.linalg.estimate import UNIT_ROUNDOFF
 
 _may_overflow = np.errstate(over="ignore", invalid="ignore")  # log-determinants of what is not finite are refused
 

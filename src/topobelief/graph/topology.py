@@ -87,6 +87,14 @@ class Topology:
         keys = np.unique(np.sort(self.edges, axis=1), axis=0)
         return Topology(self.num_nodes, keys)
 
+    @cached_property
+    def degree_sum(self) -> float:
+        """Sum over the edges of the simple graph of 1 / (d(i) d(j)), d its degrees."""
+        simple = self.simple()
+        i, j = simple.edges.T
+        degrees = simple.degrees.astype(np.float64)
+        return float(np.sum(1 / (degrees[i] * degrees[j])))
+
     def laplacian(self, weights: ArrayLike | None = None) -> sparse.csr_array:
         """L = D - W, shape (num_nodes, num_nodes), sparse.
 

@@ -30,7 +30,7 @@ from topobelief.linalg.block_cholesky import (
 from topobelief.linalg.compiled import compiled, in_parallel, num_threads
 from topobelief.linalg.edge_form import EdgeForm
 from topobelief.linalg.elimination_tree import EliminationTree, with_ancestors
-from topobelief.linalg.log_det import UNIT_ROUNDOFF, LogDet
+from topobelief.linalg.estimate import UNIT_ROUNDOFF, Estimate
 
 _EXACT_VARIANCE_SIZE = 200  # the constants of log_det's estimate
 _NUM_PROBES = 8
@@ -87,7 +87,7 @@ class FormFactor:
     tree: EliminationTree
     diagonal: FloatArray
     blocks: FloatArray
-    log_det: LogDet
+    log_det: Estimate[float]
 
     @staticmethod
     @np.errstate(over="ignore", divide="ignore", invalid="ignore")  # what is not finite has an infinite error
@@ -110,12 +110,12 @@ class FormFactor:
         entries = np.diagonal(diagonal, axis1=1, axis2=2).copy()
         done = np.zeros(n, np.bool_) if known is None else known.copy_to(tree, diagonal, blocks)
         if not factorize((0,) * b, tree.start, tree.rows, done, diagonal, blocks):
-            return FormFactor(tree, diagonal, blocks, LogDet(math.nan, math.inf))
+            return FormFactor(tree, diagonal, blocks, Estimate(math.nan, math.inf))
         log_pivots = 2 * np.log(np.diagonal(diagonal, axis1=1, axis2=2)).ravel()
-        factor = FormFactor(tree, diagonal, blocks, LogDet(math.fsum(log_pivots), 0.0))
+        factor = FormFactor(tree, diagonal, blocks, Estimate(math.fsum(log_pivots), 0.0))
         error = factor._rounding(form, entries, shift) + float(np.abs(log_pivots).sum())
         error = UNIT_ROUNDOFF * error + form.root_error
-        return FormFactor(tree, diagonal, blocks, LogDet(factor.log_det.value, error if math.isfinite(error) else math.inf))
+        return FormFactor(tree, diagonal, blocks, Estimate(factor.log_det.value, error if math.isfinite(error) else math.inf))
 
     @property
     def block_size(self) -> int:

@@ -16,7 +16,6 @@ dense matrix: it does not square the condition number.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -24,15 +23,11 @@ import qdldl
 from scipy import linalg, sparse
 
 from topobelief.arrays import BoolArray, FloatArray, IntArray
-from topobelief.errors import IllConditionedError
 from topobelief.linalg.block_pattern import BlockPattern
 from topobelief.linalg.edge_form import EdgeForm
-
-MAX_ERROR_NATS = 0.1
-"""An entropy or a signature that is not known to this is refused: it could not rank candidates."""
+from topobelief.linalg.estimate import UNIT_ROUNDOFF, Estimate
 
 _QDLDL: Any = qdldl  # ships no types
-UNIT_ROUNDOFF = float(np.finfo(np.float64).eps) / 2
 _EXACT_VARIANCE_SIZE = 200  # up to here the variances of the error estimate are exact
 _NUM_PROBES = 8
 _PROBE_SAFETY = 2.0  # eight probes underestimate one variance by more than this in few cases, a sum of them in fewer
@@ -43,41 +38,7 @@ _HOLD_STRONGEST_ERROR = 1e-6  # nats; below it one more factorisation would not 
 _ASSEMBLY_OPERATIONS = 16  # roundings behind one term of a block
 
 
-@dataclass(frozen=True, slots=True)
-class LogDet:
-    """A log-determinant and an estimate of its absolute rounding error, both in nats."""
-
-    value: float
-    error: float
-
-    def require_accuracy(self, what: str) -> LogDet:
-        """Itself, if its error is small enough to mean anything.
-
-        Raises
-        ------
-        IllConditionedError
-            If the error exceeds `MAX_ERROR_NATS`; says of `what`.
-        """
-        if not self.error <= MAX_ERROR_NATS:
-            raise IllConditionedError(what, self.error)
-        return self
-
-    def __add__(self, other: LogDet) -> LogDet:
-        return LogDet(self.value + other.value, self.error + other.error)
-
-    def __sub__(self, other: LogDet) -> LogDet:
-        return LogDet(self.value - other.value, self.error + other.error)
-
-    def __rmul__(self, factor: float) -> LogDet:
-        return LogDet(factor * self.value, abs(factor) * self.error)
-
-    def plus(self, constant: float) -> LogDet:
-        """A constant added, with the rounding that the sum costs."""
-        value = self.value + constant
-        return LogDet(value, self.error + UNIT_ROUNDOFF * (abs(constant) + abs(self.value) + abs(value)))
-
-
-_UNKNOWN = LogDet(math.nan, math.inf)
+_UNKNOWN = Estimate(math.nan, math.inf)
 _may_overflow = np.errstate(over="ignore", divide="ignore", invalid="ignore")  # what is not finite has an infinite error
 
 
@@ -105,20 +66,20 @@ class LogDetSolver:
         return int(self._free.sum())
 
     @_may_overflow
-    def log_det(self, form: EdgeForm, *, shift: float = 0.0) -> LogDet:
+    def log_det(self, form: EdgeForm, *, shift: float = 0.0) -> Estimate[float]:
         """ln det of the form's matrix plus `shift` times I, on the free nodes.
 
         0 where there are no free nodes; error inf where the factorisation breaks down.
         """
         pattern = self._pattern(form.block_size)
         if pattern.size == 0:
-            return LogDet(0.0, 0.0)
+            return Estimate(0.0, 0.0)
         result = self._by_factor(form, pattern, shift)
         if result.error > _QR_RELATIVE_ERROR * max(1.0, abs(result.value)) and pattern.size <= _QR_SIZE:
             result = min(result, _by_qr(form, pattern, shift), key=lambda candidate: candidate.error)
         return form.multiplicity * result
 
-    def gauge_free_log_det(self, form: EdgeForm) -> LogDet:
+    def gauge_free_log_det(self, form: EdgeForm) -> Estimate[float]:
         """ln det of a form for which it does not matter which one node is held (docs, the mathematics, section 4).
 
         Where rounding matters, the node with the strongest rows is held instead of the solver's.
@@ -130,11 +91,11 @@ class LogDetSolver:
         return min(here, elsewhere, key=lambda candidate: candidate.error)
 
     @_may_overflow
-    def hadamard(self, form: EdgeForm, *, shift: float = 0.0) -> LogDet:
+    def hadamard(self, form: EdgeForm, *, shift: float = 0.0) -> Estimate[float]:
         """Sum of ln det of the diagonal blocks, an upper bound of `log_det` (Hadamard and Fischer)."""
         pattern = self._pattern(form.block_size)
         if pattern.size == 0:
-            return LogDet(0.0, 0.0)
+            return Estimate(0.0, 0.0)
         blocks = pattern.diagonal_blocks(form) + shift * np.eye(form.block_size)
         scale = np.sqrt(np.diagonal(blocks, axis1=1, axis2=2))
         scaled = blocks / (scale[:, :, None] * scale[:, None, :])
@@ -145,14 +106,14 @@ class LogDetSolver:
         ratio = pattern.magnitude(form).reshape(scale.shape) / scale**2
         condition = np.linalg.cond(scaled, "fro") * ratio.max(axis=1)
         error = UNIT_ROUNDOFF * float(_ASSEMBLY_OPERATIONS * form.block_size * condition.sum() + np.abs(log_dets).sum())
-        return form.multiplicity * (LogDet(value, error) if math.isfinite(error) else _UNKNOWN)
+        return form.multiplicity * (Estimate(value, error) if math.isfinite(error) else _UNKNOWN)
 
     def _pattern(self, block_size: int) -> BlockPattern:
         if block_size not in self._patterns:
             self._patterns[block_size] = BlockPattern.build(self._edges, self._free, block_size)
         return self._patterns[block_size]
 
-    def _by_factor(self, form: EdgeForm, pattern: BlockPattern, shift: float) -> LogDet:
+    def _by_factor(self, form: EdgeForm, pattern: BlockPattern, shift: float) -> Estimate[float]:
         upper = pattern.upper(form, shift=shift)
         try:
             if pattern.block_size in self._factors:
@@ -163,17 +124,17 @@ class LogDetSolver:
             self._factors.pop(pattern.block_size, None)
             return _UNKNOWN
         factor = self._factors[pattern.block_size]
-        lower, pivots, order = _factor_parts(factor)
+        lower, pivots, order = factor_parts(factor)
         if not (pivots > 0).all():
             return _UNKNOWN
         log_pivots = np.log(pivots)
         variances = _variances(factor, form, pattern, shift)
-        error = _factor_error(upper, lower, order, pattern.magnitude(form), variances, form.block_size)
+        error = factor_error(upper, lower, order, pattern.magnitude(form), variances, form.block_size)
         error = UNIT_ROUNDOFF * (error + float(np.abs(log_pivots).sum())) + form.root_error
-        return LogDet(math.fsum(log_pivots), error) if math.isfinite(error) else _UNKNOWN
+        return Estimate(math.fsum(log_pivots), error) if math.isfinite(error) else _UNKNOWN
 
 
-def _factor_parts(factor: Any) -> tuple[sparse.csc_array, FloatArray, IntArray]:
+def factor_parts(factor: Any) -> tuple[sparse.csc_array, FloatArray, IntArray]:
     """Strict lower triangle, pivots, and the order in which variables were eliminated."""
     lower, pivots, order = factor.factors()
     return sparse.csc_array(lower), np.asarray(pivots), np.asarray(order, dtype=np.int64)
@@ -185,20 +146,20 @@ def _variances(factor: Any, form: EdgeForm, pattern: BlockPattern, shift: float)
         return np.array([factor.solve(unit)[i] for i, unit in enumerate(np.eye(pattern.size))])
     rng = np.random.default_rng(0)
     num_edges, num_rows, _ = form.rows_i.shape
-    samples = pattern.rows_transposed_times(form, _random_signs(rng, (num_edges, num_rows, _NUM_PROBES)))
+    samples = pattern.rows_transposed_times(form, random_signs(rng, (num_edges, num_rows, _NUM_PROBES)))
     if shift:
-        samples += math.sqrt(shift) * _random_signs(rng, samples.shape)
+        samples += math.sqrt(shift) * random_signs(rng, samples.shape)
     squares = np.zeros(pattern.size)
     for sample in samples.T:
         squares += factor.solve(sample) ** 2
     return _PROBE_SAFETY / _NUM_PROBES * squares
 
 
-def _random_signs(rng: np.random.Generator, shape: tuple[int, ...]) -> FloatArray:
+def random_signs(rng: np.random.Generator, shape: tuple[int, ...]) -> FloatArray:
     return np.where(rng.integers(2, size=shape, dtype=np.int8), 1.0, -1.0)
 
 
-def _factor_error(
+def factor_error(
     upper: sparse.csc_array,
     lower: sparse.csc_array,
     order: IntArray,
@@ -219,7 +180,7 @@ def _factor_error(
     return 2 * float(factored.sum() + assembled.sum()) + _CONFIDENCE * math.sqrt(2 * squares)
 
 
-def _by_qr(form: EdgeForm, pattern: BlockPattern, shift: float) -> LogDet:
+def _by_qr(form: EdgeForm, pattern: BlockPattern, shift: float) -> Estimate[float]:
     """2 ln |det R| of the rows, columns scaled to unit norm, largest rows first, columns pivoted."""
     rows = pattern.dense_rows(form)
     if shift:
@@ -243,7 +204,7 @@ def _by_qr(form: EdgeForm, pattern: BlockPattern, shift: float) -> LogDet:
     log_diagonal = np.log(diagonal)
     value = 2 * (math.fsum(log_diagonal) + math.fsum(np.log(norms)))
     error = 2 * UNIT_ROUNDOFF * float(relative @ standard_deviations + np.abs(log_diagonal).sum() + np.abs(np.log(norms)).sum())
-    return LogDet(value, error + form.root_error)
+    return Estimate(value, error + form.root_error)
 
 
 def _pivoted_qr(matrix: FloatArray) -> tuple[FloatArray, IntArray]:

@@ -12,35 +12,14 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from topobelief.arrays import FloatArray
-from topobelief.errors import IllConditionedError
 from topobelief.graph.action import Action
+from topobelief.linalg.estimate import Estimate
+from topobelief.planning.batch import Batch, Criteria
 from topobelief.planning.decision import Candidate, Decision
-from topobelief.planning.evaluation import Evaluation
-
-Quantity = Callable[[Sequence[Action]], tuple[FloatArray, FloatArray]]
+from topobelief.planning.engine import Engine
 
 Progress = Callable[[str, int, int], None]
 """Called with a stage ("signatures", "bounds", "evaluations"), how many actions are done, and out of how many."""
-
-
-def named_quantity(quantity: Quantity, actions: Sequence[Action], batch: list[int]) -> tuple[FloatArray, FloatArray]:
-    """A quantity of a batch of actions; an `IllConditionedError` says which action is to blame.
-
-    Raises
-    ------
-    IllConditionedError
-        Names the first action whose quantity double precision cannot give.
-    """
-    try:
-        return quantity([actions[index] for index in batch])
-    except IllConditionedError:
-        for index in batch:
-            try:
-                quantity([actions[index]])
-            except IllConditionedError as error:
-                label = f" ({actions[index].label!r})" if actions[index].label else ""
-                raise IllConditionedError(f"action {index}{label}: {error.what}", error.error_estimate) from None
-        raise
 
 
 class Clock:
@@ -72,34 +51,37 @@ class Clock:
 class Search:
     """Fills in signatures, then bounds, then exact values; `decision()` may be taken at any time after `rank`."""
 
-    def __init__(self, evaluation: Evaluation, actions: Sequence[Action], clock: Clock) -> None:
-        self._evaluation, self._actions, self._clock = evaluation, actions, clock
+    def __init__(self, engine: Engine, criteria: Criteria, actions: Sequence[Action], clock: Clock) -> None:
+        self._engine, self._criteria, self._actions, self._clock = engine, criteria, actions, clock
         count = len(actions)
         self._costs = np.array([action.cost for action in actions])
         self._signatures, self._lower, self._upper, self._entropies = np.full((4, count), np.nan)
+        self._free = Estimate(*np.full((2, count), np.nan))  # exact values that came with the bounds
         self._ranking: list[int] = []
 
     def rank(self, *, bounds_too: bool) -> None:
         """Signatures of all actions and their order; bounds in the same pass if wanted, while what they share is at hand."""
         rounding = 0.0
-        for batch in self._batches(range(len(self._actions))):
-            self._signatures[batch], errors = self._of(batch, self._evaluation.signatures)
-            rounding = max(rounding, float(errors.max()))
+        for places in self._parts(range(len(self._actions))):
+            batch = self._batch(places)
+            signatures = batch.signatures()
+            self._signatures[places] = signatures.value
+            rounding = max(rounding, float(signatures.error.max()))
             if bounds_too:
-                self._bound(batch)
-            self._clock.report("signatures", batch[-1] + 1, len(self._actions))
-        in_nats = self._evaluation.signature == "spanning_trees"
+                self._bound(places, batch)
+            self._clock.report("signatures", places[-1] + 1, len(self._actions))
+        in_nats = self._criteria.signature == "spanning_trees"
         score = self._signatures - self._costs if in_nats else self._signatures
         self._ranking = _descending(score, tolerance=2 * rounding)
 
     def bound_all(self) -> None:
         """Bounds of all actions, along the ranking, until the deadline."""
         done = 0
-        for batch in self._batches(self._ranking):
+        for places in self._parts(self._ranking):
             if self._clock.expired:
                 return
-            self._bound(batch)
-            done += len(batch)
+            self._bound(places, self._batch(places))
+            done += len(places)
             self._clock.report("bounds", done, len(self._actions))
 
     def prove(self, max_evaluations: int) -> None:
@@ -112,19 +94,20 @@ class Search:
             if evaluated:
                 threshold = self._upper[self._best()]
                 left = [index for index in left if not self._lower[index] > threshold]
-            batch = left[: min(size, max_evaluations - evaluated)]
-            if not batch:
+            places = left[: min(size, max_evaluations - evaluated)]
+            if not places:
                 return
-            self._entropies[batch], errors = self._of(batch, self._evaluation.entropies)
-            self._set_bounds(batch, self._entropies[batch] - errors, self._entropies[batch] + errors)
-            evaluated += len(batch)
-            size = min(2 * size, self._evaluation.batch_size)
-            self._clock.report("evaluations", evaluated, evaluated + len(left) - len(batch))
+            exact = self._exact(places)
+            self._entropies[places] = exact.value
+            self._set_bounds(places, exact.value - exact.error, exact.value + exact.error)
+            evaluated += len(places)
+            size = min(2 * size, self._engine.batch_size)
+            self._clock.report("evaluations", evaluated, evaluated + len(left) - len(places))
 
     def decision_with_margin(self, margin: float) -> Decision:
         """Algorithm 1's first branch: the upper bound of the first of the ranking, and no other."""
         first = self._ranking[0]
-        self._bound([first])
+        self._bound([first], self._batch([first]))
         self._lower[first] = np.nan
         met = bool(self._upper[first] < margin)
         alone = len(self._actions) == 1
@@ -152,19 +135,26 @@ class Search:
         proven = not open_actions and (evaluated_best or survivors == [best])
         return self._decision(best, survivors, error_bound, proven, margin_met=None)
 
-    def _batches(self, indices: Sequence[int]) -> Iterator[list[int]]:
-        size = self._evaluation.batch_size
-        for start in range(0, len(indices), size):
-            yield list(indices[start : start + size])
+    def _parts(self, places: Sequence[int]) -> Iterator[list[int]]:
+        size = self._engine.batch_size
+        for start in range(0, len(places), size):
+            yield list(places[start : start + size])
 
-    def _bound(self, batch: list[int]) -> None:
-        self._set_bounds(batch, *self._of(batch, self._evaluation.bounds))
+    def _batch(self, places: list[int]) -> Batch:
+        return Batch(self._engine, self._criteria, [self._actions[place] for place in places], places)
 
-    def _set_bounds(self, batch: list[int], lower: FloatArray, upper: FloatArray) -> None:
-        self._lower[batch], self._upper[batch] = lower + self._costs[batch], upper + self._costs[batch]
+    def _bound(self, places: list[int], batch: Batch) -> None:
+        self._set_bounds(places, *batch.bounds())
+        if batch.knows_entropies:
+            exact = batch.entropies()
+            self._free.value[places], self._free.error[places] = exact.value, exact.error
 
-    def _of(self, batch: list[int], quantity: Quantity) -> tuple[FloatArray, FloatArray]:
-        return named_quantity(quantity, self._actions, batch)
+    def _exact(self, places: list[int]) -> Estimate[FloatArray]:
+        free = Estimate(self._free.value[places], self._free.error[places])
+        return free if np.isfinite(free.value).all() else self._batch(places).entropies()
+
+    def _set_bounds(self, places: list[int], lower: FloatArray, upper: FloatArray) -> None:
+        self._lower[places], self._upper[places] = lower + self._costs[places], upper + self._costs[places]
 
     def _best(self) -> int:
         """U^, or the least value once evaluated; the earlier in the ranking where values tie."""
@@ -178,7 +168,7 @@ class Search:
         return [index for position, index in enumerate(self._ranking) if position == 0 or kept[index]]
 
     def _decision(self, best: int, survivors: list[int], error_bound: float, proven: bool, margin_met: bool | None) -> Decision:
-        session = self._evaluation
+        criteria = self._criteria
         return Decision(
             best=best,
             ranking=np.array(self._ranking),
@@ -195,15 +185,15 @@ class Search:
                 Candidate(action.label, action.num_new_poses, action.num_closures, length, action.cost)
                 for action, length in zip(self._actions, self._lengths(), strict=True)
             ),
-            objective=session.objective,
-            signature=session.signature,
-            bounds=session.family,
-            determinant=session.determinant,
+            objective=criteria.objective,
+            signature=criteria.signature,
+            bounds=criteria.bounds,
+            determinant=criteria.options.determinant,
         )
 
     def _lengths(self) -> list[float]:
         """Of the paths along each action's new poses, from the graph's last one on."""
-        graph, num_new = self._evaluation.graph, [action.num_new_poses for action in self._actions]
+        graph, num_new = self._engine.graph, [action.num_new_poses for action in self._actions]
         k, which = graph.group.position_dim, np.repeat(np.arange(len(num_new)), num_new)
         path = np.concatenate([np.zeros((0, k)), *(action.poses[:, :k] for action in self._actions if action.num_new_poses)])
         before = np.roll(path, 1, axis=0)

@@ -20,7 +20,6 @@ from topobelief.errors import PlanningError
 from topobelief.geometry import SE2_GROUP
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.planning.objectives import ObjectiveName
 from topobelief.planning.planner import Planner
 from topobelief.simulation.path_following import PathFollower
 from topobelief.simulation.record import ARRIVED, INTERRUPTED, Deliberation, History, KeyPoses, Leg, Record, RunOptions
@@ -313,7 +312,7 @@ def _shown(pose: FloatArray) -> str:
     return f"({pose[0]:.1f}, {pose[1]:.1f})"
 
 
-def achieved_entropy(graph: PoseGraph, num_existing: int, objective: ObjectiveName) -> float:
+def achieved_entropy(graph: PoseGraph, num_existing: int, objective: str) -> float:
     """The objective of a graph whose first `num_existing` poses stood before the leg, nats."""
     among = (graph.edges < num_existing).all(axis=1)
     prior = PoseGraph(graph.poses[:num_existing], graph.edges[among], None, graph.information[among])

@@ -12,7 +12,6 @@ from topobelief.candidates.polyline import path_length
 from topobelief.errors import InvalidInputError
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.planning.objectives import ObjectiveName
 from topobelief.simulation.noise import InjectedNoise
 from topobelief.simulation.occupancy import OccupancyMap
 from topobelief.simulation.scan import Scan
@@ -39,7 +38,7 @@ class RunOptions:
     """
 
     strategy: str = "spanning_trees"
-    objective: ObjectiveName = "joint"
+    objective: str = "joint"
     seed: int = 0
     noise: InjectedNoise | None = None
     unknown: bool = False

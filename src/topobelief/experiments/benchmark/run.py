@@ -28,7 +28,6 @@ from topobelief.experiments.benchmark.sessions import BenchmarkSession, ClosureS
 from topobelief.experiments.benchmark.timing import SessionTimes, degree_seconds, time_session
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.formats import read_pose_graph
-from topobelief.planning.planner import BoundsName
 
 SCHEMA = "topobelief.benchmark/1"
 SIGMA_POSITION, SIGMA_ROTATIONS = 0.1, (0.01, 0.035, 0.085)  # the paper's noises, metres and radians
@@ -195,7 +194,7 @@ def run_benchmark(plan: BenchmarkPlan, *, progress: Progress = lambda _: None) -
 
 def _proofs(name: str, graph: PoseGraph, plan: BenchmarkPlan, progress: Progress) -> Iterator[ProofSize]:
     """At each of the paper's noises, by the family that the planner chooses and by the anchored one."""
-    families: tuple[BoundsName, ...] = ("auto", "anchored")
+    families: tuple[str, ...] = ("auto", "anchored")
     for sigma, bounds in product(SIGMA_ROTATIONS, families):
         progress(f"{name}: proof at sigma_theta = {sigma}, bounds {bounds}")
         yield proof_size(

@@ -246,17 +246,12 @@ def _deviation(graph: PoseGraph, actions: Sequence[Action], log_dets: Sequence[f
 
 
 def _warm_up(session: BenchmarkSession) -> None:
-    """A decision of every kind on the session's own types of noise, with as many actions as make it incremental."""
-    from topobelief.planning.incremental import IncrementalEvaluation
-
-    for family in ("fischer", "anchored"):
-        evaluation = IncrementalEvaluation(
-            session.graph, "joint", "spanning_trees", False, family, "cholesky", anchor_of(session.graph)
-        )
-        evaluation.signatures(session.actions[:2])
-        evaluation.bounds(session.actions[:2])
-        evaluation.entropies(session.actions[:2])
-    Planner(session.graph, signature="von_neumann_approx").decide(session.actions[:2], proof="none")
+    """A decision of every kind on the session's own types of noise, by increments."""
+    for family in ("fischer", "anchored", "chain"):
+        planner = Planner(session.graph, bounds=family, engine="incremental", anchor=anchor_of(session.graph))
+        planner.decide(session.actions[:2])
+        planner.entropies(session.actions[:2])
+    Planner(session.graph, signature="von_neumann_approx", engine="incremental").decide(session.actions[:2], proof="none")
 
 
 def _seconds(work: Callable[[], object]) -> float:
