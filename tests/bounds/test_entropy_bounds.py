@@ -272,7 +272,7 @@ def test_the_paper_refuses_other_noise_and_names_the_way_out(information, messag
 
 def test_unknown_choices_are_refused():
     graph = PoseGraph(*SQUARE, np.eye(3))
-    with pytest.raises(InvalidInputError, match='expected family to be one of "paper", "fischer", got \'psi\''):
+    with pytest.raises(InvalidInputError, match='expected family to be one of "paper", "fischer", "fischer_step", got \'psi\''):
         entropy_bounds(graph, family="psi")
     with pytest.raises(InvalidInputError, match='expected determinant to be one of "cholesky", "hadamard", got \'qr\''):
         entropy_bounds(graph, determinant="qr")

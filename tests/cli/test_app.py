@@ -13,7 +13,8 @@ import pytest
 from topobelief.bounds.entropy_bounds import Determinant
 from topobelief.cli import app, main, plan, plan_stages
 from topobelief.io import ros_map
-from topobelief.planning import evaluation, objectives, planner
+from topobelief.planning import planner
+from topobelief.planning.registry import AUTO, BOUNDS, OBJECTIVES, SIGNATURES
 
 
 def test_version_is_that_of_the_distribution(topobelief):
@@ -54,16 +55,16 @@ def test_the_entry_point_exits_with_the_code(capsys):
 @pytest.mark.parametrize(
     ("offered", "known"),
     [
-        (plan.Objective, objectives.ObjectiveName),
-        (plan.Signature, evaluation.SignatureName),
-        (plan.Family, planner.BoundsName),
-        (plan.Determinant, Determinant),
-        (plan.Proof, planner.Proof),
-        (plan.Unknown, ros_map.Unknown),
+        (plan.Objective, OBJECTIVES),
+        (plan.Signature, SIGNATURES),
+        (plan.Family, (*BOUNDS, AUTO)),
+        (plan.Determinant, get_args(Determinant)),
+        (plan.Proof, get_args(planner.Proof)),
+        (plan.Unknown, get_args(ros_map.Unknown)),
     ],
 )
 def test_the_options_offer_exactly_the_choices_of_the_library(offered, known):
-    assert set(get_args(offered)) == set(get_args(known))
+    assert set(get_args(offered)) == set(known)
 
 
 def test_a_terminal_without_greek_letters_is_no_bug(office):

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from topobelief.planning.action_batch import ActionBatch
 
 from graphs import NOISES, SE2_GROUP, SE3_GROUP, Noise, random_action, random_pose_graph, sessions
 from references import log_det_exact, log_det_reference
+from topobelief.forms.action_batch import ActionBatch
 from topobelief.graph.action import posterior
 from topobelief.graph.fisher import fisher_rows
 from topobelief.graph.pose_graph import PoseGraph
@@ -78,7 +78,9 @@ def test_parts_of_the_closures_are_blocks_of_the_covariance_that_they_see(sessio
     graph, held = session.graph, int(np.random.default_rng(seed).integers(session.graph.num_poses))
     k = graph.group.position_dim
     batch = ActionBatch(graph, session.actions)
-    found = log_det_increments(factored(graph, held, "joint"), batch.extensions, blocks_of(batch.rows, "joint"), split=k)
+    found = log_det_increments(
+        factored(graph, held, "joint"), batch.extensions, blocks_of(batch.rows, "joint"), wanted="parts", first_rows=k
+    )
     starts = batch.extensions.edge_start
     for n, action in enumerate(session.actions):
         planted = np.r_[np.ones(graph.num_edges, bool), batch.extensions.planted[starts[n] : starts[n + 1]]]

@@ -104,7 +104,7 @@ def bounds_rows(
 
 def _has_equal_noise(graph: PoseGraph) -> bool:
     try:
-        require_equal_noise(graph)
+        require_equal_noise(graph.information)
     except InvalidGraphError:
         return False
     return True

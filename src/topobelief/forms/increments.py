@@ -119,7 +119,7 @@ class IncrementalForms(Forms[FloatArray], ClosureForms[FloatArray]):
         return self
 
     def base(self) -> Estimate[FloatArray]:
-        added = self._known_of("joint") or self._increments("joint", 0.0)
+        added = self._known_of("joint") or self._increments("joint", 0.0, "parts")
         return self._extended("joint", 0.0, added, np.zeros(self._batch.count))
 
     def closures(self, form: FormName, rows: Rows = "all") -> Estimate[FloatArray]:

@@ -35,14 +35,14 @@ class GraphForms(Forms[float]):
     def __init__(
         self, graph: PoseGraph, *, anchor: int, prior: PoseGraph | None = None, prior_rows: FisherRows | None = None
     ) -> None:
-        self._graph, self._anchor = graph, anchor
+        self.graph, self.anchor = graph, anchor
         self._prior, self._prior_rows = graph if prior is None else prior, prior_rows
         self._solvers: dict[int, LogDetSolver] = {}
         self._known: dict[tuple[FormName, float, Part], Estimate[float]] = {}
 
     @property
     def tangent_dim(self) -> int:
-        return self._graph.tangent_dim
+        return self.graph.tangent_dim
 
     @property
     def num_existing(self) -> int:
@@ -50,16 +50,16 @@ class GraphForms(Forms[float]):
 
     @property
     def num_new(self) -> float:
-        return float(self._graph.num_poses - self._prior.num_poses)
+        return float(self.graph.num_poses - self._prior.num_poses)
 
     def of_topology(self, quantity: Callable[[Topology], float]) -> float:
-        return quantity(self._graph.topology)
+        return quantity(self.graph.topology)
 
     def degree_sum(self) -> float:
-        return self._graph.topology.degree_sum
+        return self.graph.topology.degree_sum
 
     def mean_log_noise(self) -> float:
-        return mean_log_noise(self._graph.information)
+        return mean_log_noise(self.graph.information)
 
     @property
     def weights(self) -> tuple[FloatArray, FloatArray]:
@@ -70,7 +70,7 @@ class GraphForms(Forms[float]):
         return self._rows.weights is not None
 
     def largest_lever_sum(self) -> float:
-        sums = np.bincount(self._graph.edges[:, 0], weights=self.weights[0] * self._rows.squared_lengths())
+        sums = np.bincount(self.graph.edges[:, 0], weights=self.weights[0] * self._rows.squared_lengths())
         return float(sums.max(initial=0.0))
 
     def log_det(self, form: FormName, *, shift: float = 0.0, part: Part = "all") -> Estimate[float]:
@@ -80,10 +80,10 @@ class GraphForms(Forms[float]):
         return self._known[key]
 
     def hadamard(self, form: FormName, *, shift: float = 0.0) -> Estimate[float]:
-        return self._solver(self._anchor).hadamard(self._form(form, self._rows), shift=shift)
+        return self._solver(self.anchor).hadamard(self._form(form, self._rows), shift=shift)
 
     def sheared_rotations(self, step: float, *, hadamard: bool) -> Estimate[float]:
-        return sheared_log_det(self._rows.joint(), self.split[0], self._graph.num_poses, self._anchor, step, hadamard=hadamard)
+        return sheared_log_det(self._rows.joint(), self.split[0], self.graph.num_poses, self.anchor, step, hadamard=hadamard)
 
     def knows(self, form: FormName) -> bool:
         return (form, 0.0, "all") in self._known
@@ -97,37 +97,37 @@ class GraphForms(Forms[float]):
         if name == "joint" and not shift:  # the information matrix may be worst conditioned: its strongest pose is held
             return self._solver(form.strongest_node()).log_det(form)
         if name == "rotations" or shift:
-            return self._solver(self._anchor).log_det(form, shift=shift)
-        return self._solver(self._anchor).gauge_free_log_det(form)
+            return self._solver(self.anchor).log_det(form, shift=shift)
+        return self._solver(self.anchor).gauge_free_log_det(form)
 
     def _of_new_poses(self, name: FormName) -> Estimate[float]:
         if self.num_new == 0:
             return Estimate(0.0, 0.0)
         form = self._form(name, self._new_rows)
-        return LogDetSolver(form.edges, self._graph.num_poses, np.arange(self.num_existing)).log_det(form)
+        return LogDetSolver(form.edges, self.graph.num_poses, np.arange(self.num_existing)).log_det(form)
 
     def _form(self, name: FormName, rows: FisherRows) -> EdgeForm:
         if name in ("trees_p", "trees_r"):
-            return laplacian_form(rows.edges, self.weights[name == "trees_r"][self._graph.num_edges - len(rows.edges) :])
+            return laplacian_form(rows.edges, self.weights[name == "trees_r"][self.graph.num_edges - len(rows.edges) :])
         return getattr(rows, name)()
 
     def _solver(self, held: int) -> LogDetSolver:
         """Forms of one block size share its ordering and symbolic factor."""
         if held not in self._solvers:
-            self._solvers[held] = LogDetSolver(self._graph.edges, self._graph.num_poses, held)
+            self._solvers[held] = LogDetSolver(self.graph.edges, self.graph.num_poses, held)
         return self._solvers[held]
 
     @cached_property
     def _weights(self) -> tuple[FloatArray, FloatArray]:
-        return weights_of(self._graph.information)
+        return weights_of(self.graph.information)
 
     @cached_property
     def _new_rows(self) -> FisherRows:
-        return fisher_rows(self._graph, first_edge=self._prior.num_edges)
+        return fisher_rows(self.graph, first_edge=self._prior.num_edges)
 
     @cached_property
     def _rows(self) -> FisherRows:
-        if self._prior is self._graph:
-            return fisher_rows(self._graph)
+        if self._prior is self.graph:
+            return fisher_rows(self.graph)
         prior = fisher_rows(self._prior) if self._prior_rows is None else self._prior_rows
         return prior.joined(self._new_rows)

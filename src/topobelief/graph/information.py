@@ -100,6 +100,7 @@ def _repeats_one(information: FloatArray) -> bool:
     return len(information) > 1 and bool(information.strides[0] == 0 or (information == information[0]).all())
 
 
+@np.errstate(over="ignore")  # entries of a matrix may be further apart than the range of numbers
 def isotropic_weights(information: FloatArray) -> tuple[FloatArray, FloatArray] | None:
     """(w_p, w_r), each of shape (num_edges,), where every Omega is blkdiag(w_p I_k, w_r I_q); None elsewhere."""
     if _repeats_one(information):

@@ -22,7 +22,7 @@ Number = TypeVar("Number", float, FloatArray)
 """A float, or an array of shape (K,)."""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, slots=True)
 class Estimate(Generic[Number]):
     """A quantity and an estimate of its absolute rounding error.
 

@@ -70,12 +70,11 @@ def sheared_log_det(
 def _sparse_rows(form: EdgeForm, num_nodes: int, held: int) -> sparse.csc_array:
     """All rows on the variables of the free nodes."""
     m, r, b = form.rows_i.shape
-    ends: IntArray = form.edges.T[:, :, None] * b + np.arange(b)
-    row: IntArray = np.arange(m * r * b) // b
-    column = np.repeat(ends, r, axis=1)
-    values = np.concatenate([form.rows_i.ravel(), form.rows_j.ravel()])
-    places = np.concatenate([row, row]), column.ravel()
-    matrix = sparse.csc_array((values, places), shape=(m * r, num_nodes * b))
+    variables: IntArray = b * form.edges.T[:, :, None, None] + np.arange(b, dtype=np.int64)  # ends, edges, 1, b
+    column = np.broadcast_to(variables, (2, m, r, b))
+    row = np.broadcast_to(np.arange(m * r, dtype=np.int64).reshape(m, r, 1), (2, m, r, b))
+    values = np.stack([form.rows_i, form.rows_j])
+    matrix = sparse.csc_array((values.ravel(), (row.ravel(), column.ravel())), shape=(m * r, num_nodes * b))
     return matrix[:, np.arange(num_nodes * b) // b != held]
 
 

@@ -92,7 +92,7 @@ def spanning_tree_signature(topology: Topology, information: ArrayLike) -> float
 
 def spanning_trees(forms: TreeForms[Number], options: SignatureOptions) -> Estimate[Number]:
     """s_ST or s_map, whichever belongs to the objective."""
-    return options.trees(forms)
+    return options.trees(forms).known("s_ST")
 
 
 def joint_signature(forms: TreeForms[Number]) -> Estimate[Number]:

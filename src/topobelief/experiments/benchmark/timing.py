@@ -17,11 +17,11 @@ import numpy as np
 
 from topobelief.experiments.benchmark.baselines import Baseline, anchor_of, baselines
 from topobelief.experiments.benchmark.sessions import BenchmarkSession
+from topobelief.forms.action_batch import ActionBatch
+from topobelief.forms.degree_sums import DegreeSums
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.planning.action_batch import ActionBatch
 from topobelief.planning.planner import Planner
-from topobelief.signatures.degree_increments import DegreeEntropy
 
 Kind = Literal["standard", "lemma", "topology", "engine"]
 
@@ -209,9 +209,9 @@ def degree_seconds(session: BenchmarkSession, *, repetitions: int) -> float:
     """Seconds that the von Neumann entropy by degrees takes an action, median, once its edges stand in one array."""
     batch = ActionBatch(session.graph, session.actions)
     arrays = batch.edges, batch.edge_start, batch.num_new
-    entropy = DegreeEntropy(session.graph.topology)
-    entropy.of_extensions(*arrays)
-    return statistics.median(_seconds(lambda: entropy.of_extensions(*arrays)) for _ in range(repetitions)) / batch.count
+    sums = DegreeSums(session.graph.topology)
+    sums.of_extensions(*arrays)
+    return statistics.median(_seconds(lambda: sums.of_extensions(*arrays)) for _ in range(repetitions)) / batch.count
 
 
 def _time_baseline(
