@@ -109,9 +109,9 @@ def test_each_decision_chooses_its_family_anew():
     assert planner.decide(actions).bounds == "chain"
 
 
-def test_few_actions_take_fischers_bounds_without_a_trial():
+def test_from_scratch_fischers_bounds_are_taken_without_a_trial():
     graph, actions = flat(0.3)
-    assert Planner(graph, bounds="auto").decide(actions).bounds == "fischer"
+    assert Planner(graph, bounds="auto", engine="scratch").decide(actions).bounds == "fischer"
 
 
 def test_an_action_beyond_double_precision_is_named_by_increments_too():

@@ -37,6 +37,7 @@ _NUM_PROBES = 8
 _PROBE_SAFETY = 2.0
 _CONFIDENCE = 4.0
 _ASSEMBLY_OPERATIONS = 16
+_LEAST_WORK = 100_000  # block products below which a thread costs more than it saves
 
 
 class Paths(NamedTuple):
@@ -149,6 +150,8 @@ class FormFactor:
         tree, parts = self.tree, num_threads()
         work = np.diff(tree.start) * (tree.depth + 1) * with_ancestors(tree.parent, places)
         total = np.cumsum(work)
+        if len(total) == 0 or total[-1] < _LEAST_WORK:
+            return [0, len(places)]
         cuts = np.searchsorted(total, total[-1:] * np.arange(1, parts) / parts)
         return [0, *np.searchsorted(places, cuts).tolist(), len(places)]
 
@@ -175,8 +178,7 @@ class FormFactor:
         """diag M^-1, shape (n, b): exact for small matrices, else from samples of covariance M^-1, with a safety factor."""
         tree, b = self.tree, self.block_size
         if tree.num_free * b <= _EXACT_VARIANCE_SIZE:
-            paths = self.paths(np.arange(tree.num_free))
-            return np.array([np.diagonal(paths.inverse_block(t, t)) for t in range(tree.num_free)]).reshape(-1, b)
+            return _squared_norms(self.paths(np.arange(tree.num_free)))
         rng = np.random.default_rng(0)
         num_edges, num_rows, _ = form.rows_i.shape
         samples = np.zeros((tree.num_free, b, _NUM_PROBES))
@@ -243,6 +245,20 @@ def changed_nodes(old: EdgeForm, new: EdgeForm, num_nodes: int, held: tuple[int,
 
 def _random_signs(rng: np.random.Generator, shape: tuple[int, ...]) -> FloatArray:
     return np.where(rng.integers(2, size=shape, dtype=np.int8), 1.0, -1.0)
+
+
+@compiled
+def _squared_norms(paths: Paths) -> FloatArray:
+    """Diagonal of M^-1 at some places, shape (w, b)."""
+    b = paths.block_size
+    norms = np.zeros((len(paths.places), b))
+    for k in range(len(norms)):
+        length = b * int(paths.lengths[k])
+        for c in range(b):
+            row = paths.values[paths.start[k] + c * length :]
+            for m in range(length):
+                norms[k, c] += row[m] * row[m]
+    return norms
 
 
 @compiled

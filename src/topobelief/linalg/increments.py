@@ -33,6 +33,7 @@ from topobelief.linalg.increment_kernels import add_diagonal_increments, add_inc
 
 _PATH_NUMBERS = 8_000_000  # numbers a variable of a node that the paths of one group of extensions may take: 64 MB
 _PARTS_PER_THREAD = 4
+_LEAST_EDGES = 2000  # below so many edges of extensions a thread costs more than it saves
 _OPERATIONS = 32  # roundings behind one term of R
 _may_overflow = np.errstate(over="ignore", invalid="ignore")  # what is not finite is refused
 
@@ -113,7 +114,7 @@ def log_det_increments(
                 split = first_rows if wanted == "parts" else 0
                 add_increments(extensions, rows_i, rows_j, shift, path_of, paths, split, part, out)
 
-        parts = min(len(which), _PARTS_PER_THREAD * num_threads())
+        parts = min(len(which), _PARTS_PER_THREAD * num_threads()) if len(extensions.edges) >= _LEAST_EDGES else 1
         in_parallel(add, np.linspace(0, len(which), parts + 1).astype(int).tolist())
 
     for which in [np.arange(extensions.num_extensions)] if factor is None else _groups(factor, extensions):

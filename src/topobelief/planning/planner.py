@@ -12,6 +12,7 @@ by a von Neumann signature too. The proof evaluates J along the ranking and skip
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from importlib.util import find_spec
@@ -268,10 +269,8 @@ class Planner:
         """The engine that was asked for, or the one that is worth its time."""
         name = self._given_engine
         if name == AUTO:
-            worthwhile = num_actions * self._graph.num_edges >= _INCREMENTAL_WORK or self._criteria.bounds in (
-                "anchored",
-                "chain",
-            )
+            large = num_actions * self._graph.num_edges >= _INCREMENTAL_WORK
+            worthwhile = large or _kernels_are_loaded() or self._criteria.bounds in ("anchored", "chain")
             name = "incremental" if worthwhile and _has_kernels() else "scratch"
         if name not in self._engines:
             self._engines[name] = chosen(ENGINES, name)(self._graph, self._anchor)
@@ -317,6 +316,11 @@ def _cheapest_bounds(engine: Engine, criteria: Criteria, actions: Sequence[Actio
     costs = np.array([action.cost for action in sample])
     num_open = np.count_nonzero(lower + costs <= (upper + costs).min()) - 1  # without the best
     return "fischer" if num_open <= _OPEN_SHARE * (len(sample) - 1) else "chain"
+
+
+def _kernels_are_loaded() -> bool:
+    """Whether this process has paid for loading the compiled kernels."""
+    return "topobelief.linalg.increments" in sys.modules
 
 
 def _has_kernels() -> bool:
