@@ -15,7 +15,7 @@ from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.decision import Decision
 from topobelief.planning.planner import Planner
 
-FAMILIES: tuple[str, ...] = ("paper", "fischer", "anchored")
+FAMILIES = ("paper", "fischer", "anchored", "chain")
 
 
 def block_isotropic(sigma_position: float, sigma_rotation: float) -> FloatArray:

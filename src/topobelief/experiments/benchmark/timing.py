@@ -169,9 +169,12 @@ def time_engine(
         Planner(graph, signature="von_neumann_approx").decide(actions, proof="none")
         return ""
 
-    def bounds(actions: Sequence[Action]) -> str:
-        decision = Planner(graph, bounds="fischer").decide(actions)
-        return f"{len(decision.survivors)} of {len(actions)} may be the best"
+    def bounds(family: str) -> Callable[[Sequence[Action]], str]:
+        def decide(actions: Sequence[Action]) -> str:
+            decision = Planner(graph, bounds=family).decide(actions)
+            return f"{len(decision.survivors)} of {len(actions)} may be the best"
+
+        return decide
 
     def optimum(actions: Sequence[Action]) -> str:
         decision = Planner(graph, bounds="auto").decide(actions, proof="optimal")
@@ -185,7 +188,9 @@ def time_engine(
     for name, decide in (
         ("signature s_ST", ranking),
         ("signature ŝ_VN", degrees),
-        ("signature and Fischer bounds", bounds),
+        ("signature and Fischer bounds", bounds("fischer")),
+        ("signature and anchored bounds", bounds("anchored")),
+        ("signature and chain bounds", bounds("chain")),
         ("proven optimum", optimum),
         ("exact J of all", exact),
     ):
