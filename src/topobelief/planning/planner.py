@@ -153,6 +153,7 @@ class Planner:
 
         Examples
         --------
+        >>> from topobelief.graph.action import posterior
         >>> prior = PoseGraph([[0, 0, 0], [1, 0, 0]], [(0, 1)], None, np.eye(3) * 100)
         >>> planner = Planner(prior)
         >>> ahead = Action([[2, 0, 0]], [(1, 2)], np.eye(3) * 100)
