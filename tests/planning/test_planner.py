@@ -1,6 +1,8 @@
 """Algorithm 1 and its proof, field by field, against exhaustive evaluation."""
 
+import copy
 import math
+import pickle
 from itertools import pairwise
 
 import numpy as np
@@ -20,6 +22,7 @@ from topobelief.errors import (
 )
 from topobelief.graph.action import Action, posterior
 from topobelief.graph.pose_graph import PoseGraph
+from topobelief.planning import planner as planner_module
 from topobelief.planning.planner import Planner
 from topobelief.signatures.von_neumann import von_neumann_entropy, von_neumann_entropy_approx
 
@@ -51,6 +54,11 @@ def assert_ranked(decision, costs):
     assert (along >= np.maximum.accumulate(along[::-1])[::-1] - rounding).all()
     for earlier, later in pairwise(decision.ranking):
         assert score[earlier] != score[later] or earlier < later
+
+
+def contents(action):
+    """What equal actions have in common."""
+    return tuple(array.tobytes() for array in (action.poses, action.edges, action.information))
 
 
 def exhaustive(session, objective):
@@ -176,7 +184,7 @@ def test_a_proof_returns_the_best_action(session, configuration):
     assert decision.error_bound <= slack
     assert decision.best in decision.survivors
     evaluated = np.flatnonzero(~np.isnan(decision.entropies))
-    assert decision.num_evaluations == len(evaluated)
+    assert decision.num_evaluations == len({contents(session.actions[index]) for index in evaluated})
     costs = np.array([action.cost for action in session.actions])
     assert np.allclose(decision.entropies[evaluated] + costs[evaluated], J[evaluated], rtol=1e-9, atol=1e-9)
     # evaluated: both bounds are that value widened by its error
@@ -317,6 +325,37 @@ def test_of_identical_actions_the_cheaper_is_proven_best():
     assert decision.entropies[1] == pytest.approx(Planner(LINE).entropies([dear])[0])
 
 
+@pytest.mark.parametrize("work", [np.inf, 0], ids=["from scratch", "by increments"])
+@pytest.mark.parametrize("signature", SIGNATURES)
+def test_equal_actions_are_computed_once(monkeypatch, work, signature):
+    """Labels, costs and the way in which a noise is given do not make a difference; poses, edges and noise do."""
+    monkeypatch.setattr(planner_module, "_INCREMENTAL_WORK", work)
+    named = Action(revisit.poses, revisit.edges, [OMEGA] * 3, label="another name", cost=0.25)
+    other_noise = Action(revisit.poses, revisit.edges, [OMEGA, OMEGA, 0.999 * OMEGA])
+    other_place = Action(revisit.poses + [[0, -0.01, 0]], revisit.edges, OMEGA)
+    actions = [explore, revisit, named, other_noise, revisit, other_place]
+    planner, told = Planner(LINE, signature=signature), []
+    decision = planner.decide(actions, proof="optimal", on_progress=lambda *news: told.append(news))
+    assert ("signatures", 4, 4) in told
+    assert (decision.best, decision.proven_optimal) == (1, True)
+    values = planner.entropies(actions, on_progress=lambda *news: told.append(news))
+    assert told[-1] == ("evaluations", 4, 4)
+    np.testing.assert_allclose(values, [Planner(LINE).entropies([action])[0] for action in actions], rtol=1e-12)
+    for name in ("signatures", "entropies"):
+        assert len(set(getattr(decision, name)[[1, 2, 4]])) == 1
+    for bound in (decision.lower, decision.upper):
+        assert (bound[1], bound[2]) == (bound[4], bound[4] + 0.25)
+    evaluated = np.flatnonzero(~np.isnan(decision.entropies))
+    assert decision.num_evaluations == len({contents(actions[index]) for index in evaluated}) < len(evaluated)
+    limited = planner.decide(actions, proof="optimal", max_evaluations=1)
+    assert limited.num_evaluations == 1
+
+
+def test_a_margin_bounds_the_first_of_equal_actions_alone():
+    decision = Planner(LINE).decide([revisit, revisit, explore], margin=0.0)
+    assert np.isfinite(decision.upper).tolist() == [True, False, False]
+
+
 def test_cost_is_left_out_of_entropies_and_kept_in_bounds():
     dear = Action(revisit.poses, revisit.edges, OMEGA, cost=3.0)
     planner = Planner(LINE)
@@ -356,6 +395,13 @@ def test_results_are_read_only_arrays():
         array = getattr(decision, name)
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0
+
+
+def test_a_planner_goes_through_pickle_and_copies():
+    planner = Planner(LINE, objective="map", anchor=1)
+    expected = planner.decide([explore, revisit, stay], proof="optimal").to_dict()
+    for other in (pickle.loads(pickle.dumps(planner)), copy.deepcopy(planner), copy.copy(planner)):
+        assert other.decide([explore, revisit, stay], proof="optimal").to_dict() == expected
 
 
 def test_a_planner_decides_again_the_same():

@@ -14,7 +14,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Literal, get_args
+from threading import RLock
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
@@ -30,7 +31,7 @@ from topobelief.graph.topology import checked_anchor
 from topobelief.planning.decision import Decision
 from topobelief.planning.evaluation import Evaluation, ScratchEvaluation, SignatureName
 from topobelief.planning.objectives import ObjectiveName
-from topobelief.planning.search import Clock, Progress, Search, named_quantity
+from topobelief.planning.search import Clock, Progress, Search
 from topobelief.signatures.von_neumann import DENSE_SPECTRUM_SIZE, expected_spectrum_seconds
 
 if TYPE_CHECKING:
@@ -44,6 +45,9 @@ Proof = Literal["none", "bounded", "optimal"]
 
 class Planner:
     """Chooses among actions on one pose graph.
+
+    Threads may share a planner; its decisions are made one after the other. In pickles and copies it is one that has factored
+    nothing yet.
 
     Parameters
     ----------
@@ -111,8 +115,19 @@ class Planner:
         self._choices = (objective, signature, normalized)
         self._determinant: Determinant = determinant
         self._take(graph)
+        self._start()
+
+    def _start(self) -> None:
+        self._lock = RLock()  # evaluations keep what they computed last
         self._scratch: ScratchEvaluation | None = None
         self._incremental: IncrementalEvaluation | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name not in ("_lock", "_scratch", "_incremental")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._start()
 
     def _take(self, graph: PoseGraph) -> None:
         """Check a prior and plan on it from now on."""
@@ -159,12 +174,13 @@ class Planner:
         >>> planner.extend(posterior(prior, ahead)).graph.num_poses
         3
         """
-        before = self._graph
-        self._take(graph)
-        self._scratch = None
-        if self._incremental is not None:
-            grown = graph.group is before.group and graph.num_poses >= before.num_poses
-            self._incremental = self._incremental.extended(graph, self._anchor) if grown else None
+        with self._lock:
+            before = self._graph
+            self._take(graph)
+            self._scratch = None
+            if self._incremental is not None:
+                grown = graph.group is before.group and graph.num_poses >= before.num_poses
+                self._incremental = self._incremental.extended(graph, self._anchor) if grown else None
         return self
 
     def decide(
@@ -211,12 +227,19 @@ class Planner:
             Where double precision cannot give a quantity.
         """
         _check_limits(margin, proof, max_evaluations, deadline)
+        clock = Clock(deadline, on_progress)
+        with self._lock:
+            return self._decided(actions, clock, margin, proof, max_evaluations)
+
+    def _decided(
+        self, actions: Sequence[Action], clock: Clock, margin: float | None, proof: Proof, max_evaluations: int | None
+    ) -> Decision:
         check_actions(self._graph, actions)
         self._refuse_dense_spectrum(self._graph.num_poses + max(action.num_new_poses for action in actions))
         if self._bounds == "paper":
             self._require_equal_noise(actions)
-        search = Search(self._evaluation_of(len(actions)), actions, Clock(deadline, on_progress))
-        together = margin is None and proof != "none" and deadline is None
+        search = Search(self._evaluation_of(len(actions)), actions, clock)
+        together = margin is None and proof != "none" and not clock.limited
         search.rank(bounds_too=together)
         if margin is not None:
             return search.decision_with_margin(margin)
@@ -243,14 +266,11 @@ class Planner:
         IllConditionedError
             Where double precision cannot give an entropy.
         """
-        check_actions(self._graph, actions)
-        clock, evaluation = Clock(None, on_progress), self._evaluation_of(len(actions))
-        values = np.empty(len(actions))
-        for start in range(0, len(actions), evaluation.batch_size):
-            batch = list(range(start, min(start + evaluation.batch_size, len(actions))))
-            values[batch], _ = named_quantity(evaluation.entropies, actions, batch)
-            clock.report("evaluations", batch[-1] + 1, len(actions))
-        return values
+        clock = Clock(None, on_progress)
+        with self._lock:
+            check_actions(self._graph, actions)
+            search = Search(self._evaluation_of(len(actions)), actions, clock)
+            return search.entropies_of_all()
 
     def _evaluation_of(self, num_actions: int) -> Evaluation:
         """From scratch, or by increments where that is worth the compiled kernels' time to load."""
