@@ -332,7 +332,7 @@ def test_equal_actions_are_computed_once(monkeypatch, work, signature):
     monkeypatch.setattr(planner_module, "_INCREMENTAL_WORK", work)
     named = Action(revisit.poses, revisit.edges, [OMEGA] * 3, label="another name", cost=0.25)
     other_noise = Action(revisit.poses, revisit.edges, [OMEGA, OMEGA, 0.999 * OMEGA])
-    other_place = Action(revisit.poses + [[0, -0.01, 0]], revisit.edges, OMEGA)
+    other_place = Action([[4, 0.99, 0]], revisit.edges, OMEGA)
     actions = [explore, revisit, named, other_noise, revisit, other_place]
     planner, told = Planner(LINE, signature=signature), []
     decision = planner.decide(actions, proof="optimal", on_progress=lambda *news: told.append(news))

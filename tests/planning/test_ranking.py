@@ -111,7 +111,7 @@ def test_equal_actions_are_found():
 def test_actions_that_differ_in_the_order_of_their_edges_tie(monkeypatch, work):
     """The same graph, summed up in other orders."""
     monkeypatch.setattr(planner_module, "_INCREMENTAL_WORK", work)
-    rng, noise = np.random.default_rng(1), Noise(SE2_GROUP, "equal", 100.0, 0.4, 2.0)
+    rng, noise = np.random.default_rng(1), Noise(SE2_GROUP, "isotropic", 100.0, 0.4, 2.0)
     graph = random_pose_graph(rng, noise, 40, 12)
     action = random_action(rng, graph, noise, max_new=8, max_closures=6)
     shuffled = [

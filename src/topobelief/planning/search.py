@@ -21,8 +21,8 @@ from topobelief.planning.ranking import first_alike, ranking_of
 Quantity = Callable[[Sequence[Action]], tuple[FloatArray, FloatArray]]
 
 Progress = Callable[[str, int, int], None]
-"""Called with a stage ("signatures", "bounds", "evaluations"), how many actions are done, and out of how many. Actions with the same
-poses and edges are computed once, and count once."""
+"""Called with a stage ("signatures", "bounds", "evaluations"), how many actions are done, and out of how many; equal actions
+count once."""
 
 
 def named_quantity(quantity: Quantity, actions: Sequence[Action], batch: list[int]) -> tuple[FloatArray, FloatArray]:
