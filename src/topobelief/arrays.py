@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,10 +30,11 @@ class ReadOnlyArrays:
         return _with_read_only_arrays, (type(self), values)
 
 
-def _with_read_only_arrays(kind: type, values: dict[str, Any]) -> Any:
-    instance = object.__new__(kind)
+def _with_read_only_arrays(kind: type[Any], values: dict[str, Any]) -> Any:
+    instance: Any = object.__new__(kind)
     for name, value in values.items():
-        object.__setattr__(instance, name, read_only(value) if isinstance(value, np.ndarray) else value)
+        is_array = isinstance(value, np.ndarray)
+        object.__setattr__(instance, name, read_only(cast("NDArray[Any]", value)) if is_array else value)
     return instance
 
 

@@ -41,7 +41,7 @@ class Decision(ReadOnlyArrays):
     best : int
         The chosen action: the first of the ranking, or the one of least J once evaluated.
     ranking : shape (K,), int
-        All K actions, best signature first (signature - cost for spanning trees); ties by index.
+        All K actions, best signature first (signature - cost for spanning trees), compared to 32 binary digits; ties by index.
     signatures : shape (K,)
         Raw signatures.
     lower, upper : shape (K,)

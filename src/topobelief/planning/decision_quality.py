@@ -75,11 +75,11 @@ def decision_quality(entropies: ArrayLike, signatures: ArrayLike) -> DecisionQua
     if not (np.isfinite(J).all() and np.isfinite(s).all()):
         raise InvalidInputError("expected finite entropies and signatures, got nan or inf; evaluate every action first")
     spearman, kendall, pearson = _correlations(J, -s)
-    J, exponent = _moderate(J)
+    scaled, exponent = _moderate(J)
     chosen = int(np.argmax(s))
-    error = float(J[chosen] - J.min())
-    gamma = max(_worst_violation(J, s) / 2, _pinned_violation(J, s, chosen))
-    tolerance = _RELATIVE_TOLERANCE * float(np.abs(J).max())
+    error = float(scaled[chosen] - scaled.min())
+    gamma = max(_worst_violation(scaled, s) / 2, _pinned_violation(scaled, s, chosen))
+    tolerance = _RELATIVE_TOLERANCE * float(np.abs(scaled).max())
     with np.errstate(over="ignore"):
         error_nats, gamma_nats = np.ldexp([error, gamma], exponent).tolist()
     return DecisionQuality(error_nats, gamma_nats, error <= tolerance, gamma <= tolerance, spearman, kendall, pearson)
