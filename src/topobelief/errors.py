@@ -72,7 +72,6 @@ class InvalidActionError(InvalidInputError):
     def __init__(self, message: str, *, action: int | None = None, edge: int | None = None, label: str = "") -> None:
         self.action = action
         self.edge = edge
-        self.detail = message
         place = "action" if action is None else f"action {action}"
         if label:
             place += f" ({label!r})"

@@ -120,7 +120,7 @@ def test_the_table_has_a_line_per_action_in_ranking_order():
         ([EXPLORE, REVISIT], {"margin": 1e6}, "nats, is below the margin."),
         ([EXPLORE, REVISIT], {"margin": -1e6}, "nats, misses the margin."),
         ([REVISIT, REVISIT], {}, "No candidate can be better by more than"),
-        ([REVISIT, REVISIT], {"proof": "optimal"}, "That is proven by 2 exact evaluations."),
+        ([REVISIT, REVISIT], {"proof": "optimal"}, "That is proven by 1 exact evaluation."),
     ],
 )
 def test_the_summary_says_what_is_known(actions, limit, words):

@@ -187,6 +187,18 @@ def test_neither_their_order_nor_their_company_changes_actions(family, group, ki
         np.testing.assert_allclose(np.ravel(one), [values[n] for values in expected], rtol=1e-12, atol=1e-11)
 
 
+@pytest.mark.parametrize("determinant", ["cholesky", "hadamard"])
+def test_the_badly_conditioned_noise_of_one_action_does_not_widen_the_others(determinant):
+    graph, actions = a_session(kind="full")
+    n = graph.num_poses
+    near = 1e8 * np.array([[1, 0, 1 - 1e-9], [0, 1, 0], [1 - 1e-9, 0, 1]])
+    odd = Action(graph.poses[-1:], [(n - 1, n), (n, 0)], near)
+    before, after = (judge(graph, determinant=determinant) for _ in range(2))
+    assert (after.entropies([*actions, odd])[1][:-1] <= 1.01 * before.entropies(actions)[1]).all()
+    for wider, bound in zip(after.bounds([*actions, odd]), before.bounds(actions), strict=True):
+        np.testing.assert_allclose(wider[:-1], bound, rtol=0, atol=1e-9)
+
+
 OMEGA = np.diag([100.0, 100.0, 400.0])
 PRIOR = PoseGraph(
     [[0, 0, 0], [2, 0, 0.5], [3, 2, 1.5], [1, 3, 3.0], [-1, 2, -2.0]],

@@ -23,7 +23,7 @@ from topobelief.simulation.scan import Scan
 def slam(world: tb.World, drive: list[KeyPose], settings: FrontEndSettings | None = None) -> BackEnd:
     """The whole of it, as a robot runs it."""
     start = drive[0].truth
-    front_end, back_end = FrontEnd(settings=settings, start=start), BackEnd(start)
+    front_end, back_end = FrontEnd(settings=settings), BackEnd(start)
     occupancy: OccupancyMap | None = None
     for pose in drive:
         odometry = front_end.add(pose.wheel, pose.scan)
@@ -54,7 +54,7 @@ def closures(back_end: BackEnd) -> list[Factor]:
 
 
 def test_a_key_pose_is_wanted_first_and_then_after_a_metre_or_fifteen_degrees() -> None:
-    front_end = FrontEnd(start=np.zeros(3))
+    front_end = FrontEnd()
     assert front_end.wants_key_pose(np.zeros(3))
     front_end.add(np.array([5.0, 0.0, 3.0]), Scan([], [], 0.0, 10.0))
     turned = SE2_GROUP.compose(np.array([5.0, 0.0, 3.0]), np.array([[0.99, 0, 0], [1.01, 0, 0], [0, 0, 0.25], [0, 0, -0.27]]))
@@ -97,7 +97,7 @@ def test_a_laser_that_contradicts_the_wheels_is_not_followed() -> None:
     """Two rooms alike, and a robot that is carried from one into the other between two scans."""
     rooms = tb.World.from_boxes([(4, 0, 4.2, 4), (1, 1, 1.5, 2), (5.2, 1, 5.7, 2)], bounds=(0, 0, 8.2, 4))
     lidar, rng = Lidar(rooms, LidarSettings()), np.random.default_rng(0)
-    front_end = FrontEnd(start=np.array([2.0, 2.0, 0.0]))
+    front_end = FrontEnd()
     front_end.add(np.zeros(3), lidar.scan(np.array([2.0, 2.0, 0.0]), 0.0, rng=rng))
     factor = front_end.add(np.array([0.4, 0.0, 0.0]), lidar.scan(np.array([6.2, 2.0, 0.0]), 1.0, rng=rng))
     assert factor is not None
@@ -108,7 +108,7 @@ def test_a_laser_that_contradicts_the_wheels_is_not_followed() -> None:
 def test_between_key_poses_the_wheels_lead_on_and_a_scan_corrects_them() -> None:
     lidar, rng = Lidar(ROOMS, LidarSettings()), np.random.default_rng(0)
     start, now = np.array([2.1, 2.2, 0.5]), np.array([2.5, 2.4, 0.6])
-    front_end = FrontEnd(start=start)
+    front_end = FrontEnd()
     front_end.add(np.zeros(3), lidar.scan(start, 0.0, rng=rng))
     slipped = SE2_GROUP.compose(SE2_GROUP.between(start, now), np.array([0.01, 0.0, 0.03]))
     np.testing.assert_allclose(front_end.pose_now(start, slipped), SE2_GROUP.compose(start, slipped), atol=1e-12)
@@ -119,7 +119,7 @@ def test_between_key_poses_the_wheels_lead_on_and_a_scan_corrects_them() -> None
 def test_in_a_bare_corridor_the_wheels_decide_along_it_and_the_laser_the_rest() -> None:
     corridor = tb.World.from_boxes([], bounds=(-60, -1, 60, 1))
     lidar, rng = Lidar(corridor, LidarSettings()), np.random.default_rng(0)
-    front_end = FrontEnd(start=np.zeros(3))
+    front_end = FrontEnd()
     front_end.add(np.zeros(3), lidar.scan(np.zeros(3), 0.0, rng=rng))
     factor = front_end.add(np.array([1.01, 0.0, 0.0]), lidar.scan(np.array([1.0, 0.02, 0.03]), 1.0, rng=rng))
     assert factor is not None
@@ -148,7 +148,7 @@ def test_wheel_covariance_is_that_of_many_slipping_drives(motion: tuple[float, f
 
 
 def test_an_estimate_of_other_poses_is_refused() -> None:
-    front_end = FrontEnd(start=np.zeros(3))
+    front_end = FrontEnd()
     front_end.add(np.zeros(3), Scan([], [], 0.0, 10.0))
     with pytest.raises(InvalidInputError, match="estimate of all 1 key poses, got 2"):
         front_end.closures(np.zeros((2, 3)), None)

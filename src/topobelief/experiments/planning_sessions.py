@@ -157,7 +157,7 @@ def office_session(name: SessionName, seed: int, xi: float, *, num_paths: int | 
 def _session(
     name: SessionName, seed: int, xi: float, graph: PoseGraph, world: World, start: Place, goal: Goal, num_paths: int | None
 ) -> PlanningSession:
-    roadmap, paths = _routes(name, seed, start, goal.place, goal.num_paths if num_paths is None else num_paths)
+    roadmap, paths = _routes(seed, start, goal.place, goal.num_paths if num_paths is None else num_paths)
     actions = predict_actions(
         graph,
         paths,
@@ -171,7 +171,7 @@ def _session(
 
 
 @lru_cache(maxsize=4)  # sessions that differ in noise alone share their paths
-def _routes(name: SessionName, seed: int, start: Place, goal: Place, num_paths: int) -> tuple[Roadmap, tuple[FloatArray, ...]]:
+def _routes(seed: int, start: Place, goal: Place, num_paths: int) -> tuple[Roadmap, tuple[FloatArray, ...]]:
     scenario = named_scenario("office")
     roadmap = build_roadmap(scenario.world, start, goal, scenario.rule.num_vertices, scenario.rule.robot_radius, seed)
     return roadmap, tuple(diverse_paths(roadmap, start, goal, num_paths, None, seed))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from topobelief.arrays import FloatArray, IntArray, frozen_floats, frozen_ints
+from topobelief.arrays import FloatArray, IntArray, ReadOnlyArrays, frozen_floats, frozen_ints
 from topobelief.errors import InvalidActionError, InvalidInputError
 from topobelief.graph.information import checked_information
 from topobelief.graph.pose_graph import PoseGraph, checked_pose_rows
@@ -20,7 +20,7 @@ from topobelief.graph.topology import Topology
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class Action:
+class Action(ReadOnlyArrays):
     """New poses and the factors among them and to the graph.
 
     Parameters

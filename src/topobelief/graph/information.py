@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from topobelief.arrays import FloatArray, frozen_floats
+from topobelief.arrays import FloatArray, frozen_floats, read_only
 from topobelief.errors import InvalidGraphError
 
 _SPLITS = {3: (2, 1), 6: (3, 3)}
@@ -60,9 +60,7 @@ def _symmetric(matrices: FloatArray) -> FloatArray:
     transposed = np.swapaxes(matrices, -1, -2)
     if np.array_equal(matrices, transposed):
         return matrices
-    mean = (matrices + transposed) / 2
-    mean.flags.writeable = False
-    return mean
+    return read_only((matrices + transposed) / 2)
 
 
 def _require_positive_definite(information: FloatArray) -> None:

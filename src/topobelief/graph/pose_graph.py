@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from topobelief.arrays import FloatArray, IntArray, frozen_floats, frozen_ints
+from topobelief.arrays import FloatArray, IntArray, ReadOnlyArrays, frozen_floats, frozen_ints, read_only
 from topobelief.errors import InvalidGraphError
 from topobelief.geometry import Group, group_of_size
 from topobelief.graph.information import checked_information
@@ -21,7 +21,7 @@ from topobelief.graph.topology import Topology
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class PoseGraph:
+class PoseGraph(ReadOnlyArrays):
     """A pose graph; immutable, its arrays read-only.
 
     Parameters
@@ -83,8 +83,7 @@ class PoseGraph:
             raise InvalidGraphError('expected every kind to be "pose"; landmarks are not supported')
         if measurements is None:
             i, j = topology.edges.T
-            checked_measurements = group.between(checked_poses[i], checked_poses[j])
-            checked_measurements.flags.writeable = False
+            checked_measurements = read_only(group.between(checked_poses[i], checked_poses[j]))
         else:
             checked_measurements, _ = checked_pose_rows(
                 measurements, name="measurements", size=group.pose_size, count=topology.num_edges
@@ -121,9 +120,7 @@ class PoseGraph:
         graph = object.__new__(cls)
         fields = {"topology": topology, "edges": topology.edges, "poses": poses, "measurements": measurements}
         for name, value in (fields | {"information": information, "ids": ids, "fixed": fixed}).items():
-            if isinstance(value, np.ndarray):
-                value.flags.writeable = False
-            object.__setattr__(graph, name, value)
+            object.__setattr__(graph, name, read_only(value) if isinstance(value, np.ndarray) else value)
         return graph
 
     @property
@@ -195,6 +192,4 @@ def checked_pose_rows(
         zero = np.flatnonzero(np.linalg.norm(array[:, 3:], axis=1) < 1e-6)
         if zero.size:
             raise InvalidGraphError(f"expected unit quaternions in {name}, got a zero one in row {zero[0]}")
-    normalized = group.normalized(array)
-    normalized.flags.writeable = False
-    return normalized, group
+    return read_only(group.normalized(array)), group

@@ -120,7 +120,8 @@ def log_det_increments(
     for which in [np.arange(extensions.num_extensions)] if factor is None else _groups(factor, extensions):
         add_group(which)
     forest, closures, held, first, others, chained, size = np.ascontiguousarray(out.T)
-    error = UNIT_ROUNDOFF * (_OPERATIONS * size + np.abs(forest) + np.abs(closures) + np.abs(chained)) + form.root_error
+    error = UNIT_ROUNDOFF * (_OPERATIONS * size + np.abs(forest) + np.abs(closures) + np.abs(chained))
+    error += _root_errors(form, extensions)
     unknown = np.full(extensions.num_extensions, np.nan)
     if isinstance(wanted, int):
         return Increments(forest, unknown, unknown, unknown, others, chained, error)
@@ -155,7 +156,15 @@ def diagonal_increments(
     rows_i, rows_j = np.ascontiguousarray(form.rows_i), np.ascontiguousarray(form.rows_j)
     add_diagonal_increments(extensions, rows_i, rows_j, shift, diagonal, held, out)
     terms = 2 * np.diff(extensions.edge_start) * b * b
-    return out, UNIT_ROUNDOFF * (_OPERATIONS * terms + np.abs(out)) + form.root_error
+    return out, UNIT_ROUNDOFF * (_OPERATIONS * terms + np.abs(out)) + _root_errors(form, extensions)
+
+
+def _root_errors(form: EdgeForm, extensions: Extensions) -> FloatArray:
+    """Sum of the form's root errors over the edges of each extension, shape (K,)."""
+    if form.root_errors is None:
+        return np.zeros(extensions.num_extensions)
+    which = np.repeat(np.arange(extensions.num_extensions), np.diff(extensions.edge_start))
+    return np.bincount(which, weights=form.root_errors, minlength=extensions.num_extensions).astype(np.float64)
 
 
 def _no_paths(block_size: int) -> Paths:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from topobelief.arrays import FloatArray, IntArray, frozen_floats, frozen_ints
+from topobelief.arrays import FloatArray, IntArray, ReadOnlyArrays, frozen_floats, frozen_ints
 from topobelief.errors import InvalidInputError
 
 SCHEMA = "topobelief.decision/1"
@@ -33,7 +33,7 @@ class Candidate:
 
 
 @dataclass(frozen=True, eq=False)
-class Decision:
+class Decision(ReadOnlyArrays):
     """The outcome of `Planner.decide` over K actions.
 
     Attributes
@@ -41,7 +41,7 @@ class Decision:
     best : int
         The chosen action: the first of the ranking, or the one of least J once evaluated.
     ranking : shape (K,), int
-        All K actions, best signature first (signature - cost for spanning trees); ties by index.
+        All K actions, best signature first (signature - cost for spanning trees), compared to 32 binary digits; ties by index.
     signatures : shape (K,)
         Raw signatures.
     lower, upper : shape (K,)
@@ -56,7 +56,7 @@ class Decision:
     margin_met : bool or None
         Whether the upper bound of the best lies below the margin; None where no margin was given.
     num_evaluations : int
-        Exact evaluations made.
+        Exact evaluations made; actions that add the same poses and measurements share one.
     proven_optimal : bool
     candidates : tuple of Candidate
     objective, signature, bounds, determinant : str
@@ -116,8 +116,8 @@ class Decision:
                 f"{ruled_out} {'was' if ruled_out == 1 else 'were'} ruled out by bounds."
             )
         elif self.proven_optimal and total > 1:
-            count = self.num_evaluations
-            spared = f"; bounds ruled out the other {total - count}" if 0 < count < total else ""
+            count, spared = self.num_evaluations, int(np.isnan(self.entropies).sum())
+            spared = f"; bounds ruled out the other {spared}" if count and spared else ""
             evaluated = f"{count} exact evaluation{'s' if count > 1 else ''}" if count else "bounds alone"
             sentences.append(f"That is proven by {evaluated}{spared}.")
         return " ".join(sentences)

@@ -16,7 +16,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from importlib.util import find_spec
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -44,6 +44,8 @@ Proof = Literal["none", "bounded", "optimal"]
 
 class Planner:
     """Chooses among actions on one pose graph.
+
+    Threads may share a planner. In pickles and copies it is one that has factored nothing yet.
 
     Parameters
     ----------
@@ -118,6 +120,9 @@ class Planner:
         self._allow_dense_spectrum = allow_dense_spectrum
         self._engines: dict[str, Engine] = {}
         self._graph, self._anchor = graph, self._checked(graph)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "_engines": {}}
 
     def _checked(self, graph: PoseGraph) -> int:
         """The pose to hold on a graph that can be planned on."""
@@ -257,14 +262,8 @@ class Planner:
             Where double precision cannot give an entropy.
         """
         check_actions(self._graph, actions)
-        clock, engine = Clock(None, on_progress), self._engine_for(len(actions))
-        values = np.empty(len(actions))
-        for start in range(0, len(actions), engine.batch_size):
-            places = range(start, min(start + engine.batch_size, len(actions)))
-            batch = Batch(engine, self._criteria, [actions[place] for place in places], places)
-            values[start : start + len(places)] = batch.entropies().value
-            clock.report("evaluations", places[-1] + 1, len(actions))
-        return values
+        clock = Clock(None, on_progress)
+        return Search(self._engine_for(len(actions)), self._criteria, actions, clock).entropies_of_all()
 
     def _engine_for(self, num_actions: int) -> Engine:
         """The engine that was asked for, or the one that is worth its time."""

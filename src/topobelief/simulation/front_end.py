@@ -101,13 +101,10 @@ class FrontEnd:
     Parameters
     ----------
     settings
-    start : shape (3,)
-        The first pose.
     """
 
-    def __init__(self, *, settings: FrontEndSettings | None = None, start: FloatArray) -> None:
+    def __init__(self, *, settings: FrontEndSettings | None = None) -> None:
         self.settings = settings or FrontEndSettings()
-        self.start = np.array(start, dtype=np.float64)
         self.scans: list[Scan] = []
         self._clouds: list[ScanCloud] = []
         self._wheel = SE2_GROUP.identity()

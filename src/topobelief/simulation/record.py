@@ -9,7 +9,6 @@ import numpy as np
 
 from topobelief.arrays import FloatArray
 from topobelief.candidates.polyline import path_length
-from topobelief.errors import InvalidInputError
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.simulation.noise import InjectedNoise
@@ -147,15 +146,6 @@ class KeyPoses:
     def __len__(self) -> int:
         return len(self.times)
 
-    def first(self, count: int) -> KeyPoses:
-        """The first `count` of them."""
-        return KeyPoses(
-            times=self.times[:count],
-            truth=self.truth[:count],
-            wheel_odometry=self.wheel_odometry[:count],
-            scans=self.scans[:count],
-        )
-
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
 class History:
@@ -172,24 +162,6 @@ class History:
     key_poses: KeyPoses
     legs: tuple[Leg, ...]
     track: FloatArray
-
-    def before_goal(self, goal: int) -> History:
-        """The part that ends where the leg to a goal began.
-
-        Raises
-        ------
-        InvalidInputError
-            Where no leg to it began.
-        """
-        begun = [number for number, leg in enumerate(self.legs) if leg.goal == goal]
-        if not begun:
-            raise InvalidInputError(f"expected a run that set out for goal {goal}, got one of {len(self.legs)} legs")
-        key_poses = self.key_poses.first(self.legs[begun[0]].first_pose + 1)
-        return History(
-            key_poses=key_poses,
-            legs=self.legs[: begun[0]],
-            track=self.track[self.track[:, 0] <= key_poses.times[-1]],
-        )
 
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)

@@ -53,7 +53,7 @@ class Slam:
     ) -> None:
         self.settings = settings or FrontEndSettings()
         self._start, self._bounds, self._noise, self._rng = start, bounds, noise, rng
-        self._front = FrontEnd(settings=self.settings, start=start)
+        self._front = FrontEnd(settings=self.settings)
         self._driving = BackEnd(start)
         self._deciding = BackEnd(start) if noise is not None else self._driving
         self._map: OccupancyMap | None = None
