@@ -175,7 +175,7 @@ def test_a_contact_ends_the_leg_and_the_run_with_its_reason(house):
 
 
 def test_an_arrival_that_never_was_does_not_count(house):
-    """Blind, with wheels that slip ten times as much as the robot thinks: it goes on to its next goal, and so does a later run."""
+    """Blind, with wheels that slip more than the robot thinks: it goes on to its next goal, and so does a later run."""
     hall = World.from_boxes([], bounds=(-30, -30, 40, 30))
     scenario = Scenario(
         "hall",

@@ -122,12 +122,12 @@ def test_a_doubtful_match_that_contradicts_the_wheels_is_not_followed() -> None:
 
 
 def caught(lidar: Lidar, *, track: bool, last: Scan | None = None) -> tuple[Factor, FloatArray]:
-    """A robot that catches on something and turns by 57 degrees while its wheels say a metre straight on; what it makes of it."""
+    """What a robot makes of it that catches on something and turns by a radian while its wheels say a metre straight on."""
     rng, place = np.random.default_rng(0), np.array([2.1, 2.2, 0.5])
     front_end = FrontEnd(start=place)
     front_end.add(np.zeros(3), lidar.scan(place, 0.0, rng=rng))
     for share in np.linspace(0, 1, 21)[1:]:
-        wheel, scan = np.array([share, 0.0, 0.0]), lidar.scan(place + [0, 0, share], share, rng=rng)
+        wheel, scan = np.array([share, 0.0, 0.0]), lidar.scan(np.array([*place[:2], place[2] + share]), share, rng=rng)
         if track and front_end.wants_scan(wheel):
             front_end.track(wheel, scan)
     motion = front_end.motion(wheel)

@@ -191,7 +191,7 @@ class FrontEnd:
         match = self._odometry_match(motion, ScanCloud(scan))
         fused = match if isinstance(match, str) else self._fused(motion, covariance, match)
         if not isinstance(fused, str):
-            motion, covariance = fused.motion, np.linalg.inv(fused.information)
+            motion, covariance = fused.motion, _inverse(fused.information)
         self._track = _Track(np.array(wheel_odometry, dtype=np.float64), motion, covariance)
 
     def add(self, wheel_odometry: FloatArray, scan: Scan, *, motion: FloatArray | None = None) -> Factor | None:
@@ -258,7 +258,7 @@ class FrontEnd:
         if isinstance(fused, str):
             strayed = SE2_GROUP.log(SE2_GROUP.between(wheels, tracked))
             widened = covariance * _widening(float(strayed @ np.linalg.solve(covariance, strayed)))
-            return Factor(newest, newest + 1, tracked, np.linalg.inv(widened), ODOMETRY, fused)
+            return Factor(newest, newest + 1, tracked, _inverse(widened), ODOMETRY, fused)
         return Factor(newest, newest + 1, fused.motion, fused.information, ODOMETRY, fused.note)
 
     def _odometry_match(self, guess: FloatArray, cloud: ScanCloud) -> Registration | str:
@@ -271,7 +271,7 @@ class FrontEnd:
 
     def _fused(self, motion: FloatArray, covariance: FloatArray, match: Registration) -> _Fused | str:
         """A motion by the wheels and its match, the product of two Gaussians; why not, where one cannot be believed."""
-        information: FloatArray = np.linalg.inv(covariance).astype(np.float64)
+        information = _inverse(covariance)
         correction = SE2_GROUP.log(SE2_GROUP.between(motion, match.pose))
         share = _share(information, match.information, correction)
         # (correction)^T (Sigma_wheels + Sigma_laser)^-1 (correction), written for a singular laser
@@ -313,6 +313,10 @@ class FrontEnd:
 def _exceeds(motion: FloatArray, distance: float, angle: float) -> bool:
     x, y, theta = motion.tolist()
     return math.hypot(x, y) >= distance or abs(theta) >= angle
+
+
+def _inverse(matrix: FloatArray) -> FloatArray:
+    return np.linalg.inv(matrix).astype(np.float64)
 
 
 def _share(information: FloatArray, other: FloatArray, correction: FloatArray) -> FloatArray:
