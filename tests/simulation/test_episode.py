@@ -8,7 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from data_files import case_file
 from topobelief.errors import InvalidInputError
+from topobelief.experiments.scenario_file import scenario_of
 from topobelief.simulation.episode import Episode, achieved_entropy
 from topobelief.simulation.lidar import LidarSettings
 from topobelief.simulation.metrics import run_metrics, trajectory_error
@@ -172,6 +174,17 @@ def test_a_contact_ends_the_leg_and_the_run_with_its_reason(house):
     assert record.num_goals_reached == 0
     assert not leg.arrived
     assert not leg.believed_arrived
+
+
+@pytest.mark.parametrize(("name", "seed"), [("depot", 7108), ("tb3_sandbox", 7105)])
+def test_a_robot_among_table_legs_and_pillars_arrives_where_it_believes_to_be(name, seed):
+    """It once caught on a leg, let its wheels spin, and was told to have arrived, 7.6 and 0.7 m from the goal."""
+    record = Episode(scenario_of(str(case_file(f"scenarios/{name}.yaml"))), RunOptions(seed=seed)).run()
+    assert [leg.outcome for leg in record.legs] == [ARRIVED, ARRIVED]
+    for leg in record.legs:
+        assert leg.contacts == 0
+        assert leg.goal_distance <= 0.3
+        assert leg.goal_distance == pytest.approx(leg.believed_goal_distance, abs=0.15)
 
 
 def test_an_arrival_that_never_was_does_not_count(house):

@@ -74,9 +74,9 @@ class Slam:
     def position_error(self) -> float:
         """By how much the position at the newest key pose may be wrong, metres.
 
-        Three standard deviations in the direction that is known worst.
+        Two standard deviations in the direction that is known worst.
         """
-        return 3 * math.sqrt(float(np.linalg.eigvalsh(self._driving.newest_covariance[:2, :2])[-1]))
+        return 2 * math.sqrt(float(np.linalg.eigvalsh(self._driving.newest_covariance[:2, :2])[-1]))
 
     @property
     def registered(self) -> PoseGraph:
