@@ -38,6 +38,10 @@ class Reporter:
             for renderable in renderables:
                 self._answer.print(renderable, markup=False, soft_wrap=isinstance(renderable, str))
 
+    def warn(self, text: str) -> None:
+        """Print a line on stderr, whoever listens."""
+        print(f"topobelief: {text}", file=sys.stderr)
+
     def answer(self, document: Mapping[str, object]) -> None:
         """Print for a program."""
         if self.as_json:

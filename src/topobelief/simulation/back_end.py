@@ -62,6 +62,11 @@ class BackEnd:
         """Which of them are in the graph, shape (number of factors,)."""
         return np.array(self._kept, dtype=np.bool_)
 
+    @property
+    def newest_covariance(self) -> FloatArray:
+        """Of the newest pose, in its own frame, shape (3, 3)."""
+        return np.asarray(self._isam.marginalCovariance(len(self._poses) - 1), dtype=np.float64)
+
     def add(self, factors: Sequence[Factor]) -> None:
         """Take in the factors of a key pose; one update.
 
