@@ -145,14 +145,26 @@ def points_within(shapes: ShapeArray) -> FloatArray:
     return _shapely.get_coordinates(_shapely.point_on_surface(shapes))
 
 
-def frechet_distance(waypoints: FloatArray, others: FloatArray) -> float:
-    """Discrete Fréchet distance of two polylines at the waypoints given, shapes (N, 2) and (M, 2)."""
-    return float(_shapely.frechet_distance(_shapely.linestrings(waypoints), _shapely.linestrings(others)))
-
-
 def nearest_part(shape: Shape, place: FloatArray) -> Polygon | None:
     """The polygon of a shape that contains a place or is nearest to it; None where the shape has none."""
     return min(polygons(shape), key=lambda part: float(part.distance(point(place))), default=None)
+
+
+class SegmentIndex:
+    """Straight segments, indexed by where they are.
+
+    Parameters
+    ----------
+    starts, ends : shape (N, 2)
+    """
+
+    def __init__(self, starts: FloatArray, ends: FloatArray) -> None:
+        self._tree = cast("Any", shapely.STRtree)(segments(starts, ends))
+
+    def near(self, place: FloatArray, distance: float) -> IntArray:
+        """Segments whose extent overlaps the square around a place: all within the distance from it, and some others."""
+        x, y = place.tolist()
+        return self._tree.query(shapely.box(x - distance, y - distance, x + distance, y + distance))
 
 
 class Region:
