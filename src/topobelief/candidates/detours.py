@@ -48,7 +48,8 @@ class Balls:
 
     def clear_of(self, starts: FloatArray, ends: FloatArray) -> BoolArray:
         """Whether each segment, shapes (N, 2), stays out of all balls."""
-        return (distances_to_segments(self.centres[:, None], starts, ends) > self.radii[:, None]).all(axis=0)
+        apart = distances_to_segments(self.centres[:, None], starts, ends) - self.radii[:, None]
+        return apart.min(axis=0, initial=np.inf) > 0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -58,7 +59,7 @@ class Detour:
     path: list[int]
     balls: Balls
     blocked: IntArray  # the entries of the search's matrix that enter a ball
-    excess: float  # metres over the shortest path of the roadmap
+    least_excess: float  # by how much all paths that avoid the balls are longer than the roadmap's shortest path, metres
 
 
 class DetourSearch:
@@ -76,30 +77,29 @@ class DetourSearch:
     """
 
     def __init__(self, roadmap: Roadmap, paths: list[list[int]], max_length: float, *, rng: np.random.Generator) -> None:
-        self._rng = rng
-        to_start, to_goal = roadmap.distances_to(0), roadmap.distances_to(1)
-        self._shortest = float(to_goal[0])
-        self._max_excess = min(max_length, float(roadmap.lengths.sum())) - self._shortest  # finite: see _shortest_path
-        a, b = roadmap.edges.T
-        through = roadmap.lengths + np.minimum(to_start[a] + to_goal[b], to_start[b] + to_goal[a])
-        a, b = roadmap.edges[through - self._shortest <= self._max_excess].T
         self._vertices = roadmap.vertices
-        self._starts, self._ends = roadmap.vertices[a], roadmap.vertices[b]
-        self._index = shapes.SegmentIndex(self._starts, self._ends)
-        lengths = np.linalg.norm(self._ends - self._starts, axis=1)
-        numbers = np.arange(1, 2 * len(a) + 1)
-        size = len(roadmap.vertices)
-        matrix = sparse.csr_array((numbers, (np.r_[a, b], np.r_[b, a])), shape=(size, size))
-        entries = np.empty_like(numbers)
-        entries[matrix.data - 1] = np.arange(len(numbers))
-        self._entries = entries.reshape(2, -1)  # of each edge, there and back
-        excess = np.empty(len(numbers))
-        excess[self._entries] = np.maximum(lengths + [to_goal[b] - to_goal[a], to_goal[a] - to_goal[b]], 0.0)
-        self._excess = excess
-        self._first = [self._undisturbed(path) for path in paths]
+        self._rng = rng
+        self._first = [Detour(path, Balls.none(), np.zeros(0, dtype=np.int64), 0.0) for path in paths]
         self._queue: deque[Detour] = deque()
         self._num_varied = 0
-        self._matrix = sparse.csr_array((excess.copy(), matrix.indices, matrix.indptr), shape=matrix.shape)
+
+        to_start, to_goal = roadmap.distances_to(0), roadmap.distances_to(1)
+        self._shortest = float(to_goal[0])
+        longest = max(min(max_length, float(roadmap.lengths.sum())), self._shortest)  # finite: see _shortest_path
+        self._max_excess = longest - self._shortest
+        a, b = roadmap.edges.T
+        through = roadmap.lengths + np.minimum(to_start[a] + to_goal[b], to_start[b] + to_goal[a])
+        a, b = roadmap.edges[through <= longest].T  # no path within the length takes any other
+        self._starts, self._ends = roadmap.vertices[a], roadmap.vertices[b]
+        self._index = shapes.SegmentIndex(self._starts, self._ends)
+
+        lengths, closer = np.linalg.norm(self._ends - self._starts, axis=1), to_goal[a] - to_goal[b]
+        excess = np.maximum(np.concatenate([lengths - closer, lengths + closer]), 0.0)
+        numbers, size = np.arange(1, len(excess) + 1), len(roadmap.vertices)
+        matrix = sparse.csr_array((numbers, (np.r_[a, b], np.r_[b, a])), shape=(size, size))
+        self._entries = np.argsort(matrix.data).reshape(2, -1)  # of each edge in the matrix, there and back
+        self._excess = excess[matrix.data - 1]
+        self._matrix = sparse.csr_array((self._excess.copy(), matrix.indices, matrix.indptr), shape=matrix.shape)
 
     def vary(self, radius: float) -> Detour | None:
         """The next detour, around one more ball of a radius.
@@ -121,16 +121,12 @@ class DetourSearch:
             self._queue.append(further)
         return further
 
-    def _undisturbed(self, path: list[int]) -> Detour:
-        excess = path_length(self._vertices[path]) - self._shortest
-        return Detour(path, Balls.none(), np.zeros(0, dtype=np.int64), excess)
-
     def _around(self, detour: Detour, centre: FloatArray, radius: float) -> Detour | None:
         """The shortest path around one more ball."""
         near = self._index.near(centre, radius)
         entering = near[distances_to_segments(centre, self._starts[near], self._ends[near]) <= radius]
         blocked = np.concatenate([detour.blocked, self._entries[:, entering].ravel()])
-        found = self._shortest_path(blocked, least_excess=detour.excess)
+        found = self._shortest_path(blocked, least_excess=detour.least_excess)
         return None if found is None else Detour(found[0], detour.balls.and_one(centre, radius), blocked, found[1])
 
     def _shortest_path(self, blocked: IntArray, *, least_excess: float) -> tuple[list[int], float] | None:

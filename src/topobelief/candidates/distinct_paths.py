@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from topobelief.arrays import BoolArray, FloatArray
+from topobelief.arrays import FloatArray
 from topobelief.candidates.polyline import sampled
 
 _NUM_SAMPLES = 32  # places at which the distance of two paths is taken; at most 62, see frechet_within
@@ -27,8 +27,8 @@ class DistinctPaths:
 
     def __init__(self, landmarks: FloatArray) -> None:
         self._landmarks = landmarks
-        self._samples = np.zeros((16, _NUM_SAMPLES, 2))
-        self._approaches = np.zeros((len(landmarks), 16))  # distance from each landmark to each path
+        self._samples: FloatArray = np.zeros((16, _NUM_SAMPLES, 2))
+        self._approaches: FloatArray = np.zeros((len(landmarks), 16))  # distance from each landmark to each path
         self._count = 0
 
     def __len__(self) -> int:

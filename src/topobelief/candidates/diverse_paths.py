@@ -21,9 +21,10 @@ from topobelief.candidates.roadmap import Roadmap
 from topobelief.candidates.straightening import Straightening
 from topobelief.errors import InvalidInputError, PlanningError
 
-_ATTEMPTS = 160  # balls of one radius, after which
-_LEAST_YIELD = 20  # so many paths must have been found for as many attempts more
-_HALVINGS = 4  # of the radius
+_ATTEMPTS_PER_PATH = 8  # balls of one radius tried at most, per path asked for
+_ATTEMPTS = 160  # of which the radius is halved
+_LEAST_YIELD = 20  # where they bring fewer paths
+_HALVINGS = 4  # in the end balls, and differences, of 1/16 of the first radius
 _NUM_LANDMARKS = 64
 
 
@@ -46,16 +47,16 @@ def diverse_paths(
     start, goal : shape (2,) or (3,)
         Metres; a heading is ignored. Places that the roadmap was not built for are joined to it.
     num_paths
-        How many at most; fewer where the roadmap has no more that differ.
+        How many at most; fewer where the roadmap has no more that differ by 1/16 of the ball radius.
     max_detour
         No path is longer than this many times the first one; at least 1. None: any length.
     seed
         The same seed gives the same paths.
     ball_radius
-        Radius of the avoided balls, and the Fréchet distance by which a path that fills up differs from all others;
-        as a share of the shortest path's length.
+        Radius of the avoided balls, and the Fréchet distance by which a path that fills up differs from all others, as a
+        share of the shortest path's length. Halved up to four times where it leaves too few paths.
     max_rays
-        Obstacles whose sides make a class, the largest first.
+        Obstacles whose sides make a class, the largest first. None is smaller than a ball, or a speck (see `Rays`).
 
     Returns
     -------
@@ -88,7 +89,7 @@ def diverse_paths(
     rays = Rays.of_obstacles(roadmap, min_size=radius, max_length=max_length, max_rays=max_rays)
     straightening = Straightening(roadmap, rays)
     classes = shortest_paths_by_class(roadmap, rays, num_classes=num_paths, max_length=max_length)
-    selection = _Selection(roadmap, straightening, num_paths, max_detour, landmarks=_landmarks(roadmap, max_length))
+    selection = _Selection(roadmap, straightening, num_paths, max_detour, _landmarks(roadmap, max_length))
     for path in classes:
         selection.add(straightening.by_pieces(roadmap.vertices[straightening.by_vertices(path)]))
     if not selection.full:
@@ -98,7 +99,7 @@ def diverse_paths(
 
 
 class _Selection:
-    """Paths within the detour limit, up to a number."""
+    """Paths within the detour limit, up to a number; those that fill up are far from all others."""
 
     def __init__(
         self,
@@ -106,13 +107,12 @@ class _Selection:
         straightening: Straightening,
         num_paths: int,
         max_detour: float | None,
-        *,
         landmarks: FloatArray,
     ) -> None:
         self.paths: list[FloatArray] = []
+        self.num_paths = num_paths
         self._roadmap = roadmap
         self._straightening = straightening
-        self._num_paths = num_paths
         self._max_detour = math.inf if max_detour is None else max_detour
         self._shortest = math.inf  # metres
         self._distinct = DistinctPaths(landmarks)
@@ -120,10 +120,10 @@ class _Selection:
     @property
     def full(self) -> bool:
         """Whether no more paths are wanted."""
-        return len(self.paths) == self._num_paths
+        return len(self.paths) == self.num_paths
 
     def add(self, path: FloatArray) -> None:
-        """Add a path, if it is not too long; and leave out those that are, where it is the shortest so far."""
+        """Add a path, unless it is too long; drop those that now are, where it is the shortest so far."""
         length = path_length(path)
         if length > self._max_detour * self._shortest:
             return
@@ -133,10 +133,10 @@ class _Selection:
             self._shortest = length
             self.paths = [path for path in self.paths if path_length(path) <= self._max_detour * length]
 
-    def considered(self, vertices: tuple[int, ...], balls: Balls, radius: float) -> bool:
-        """Add a path clear of balls, with its corners cut, unless it is near to another; whether it was not.
+    def consider(self, vertices: tuple[int, ...], balls: Balls, radius: float) -> bool:
+        """Cut the corners of a path that is clear of balls and add it; or return False, where it is near to another.
 
-        The path through the vertices as it is takes no further work, and shows that most are near to another.
+        To cut corners is expensive, and the path through the vertices shows of most that they are near to another.
         """
         path = self._roadmap.vertices[list(vertices)]
         if self.full or self._distinct.any_within(path, radius):
@@ -149,32 +149,31 @@ class _Selection:
 
 
 def _fill_up(selection: _Selection, search: DetourSearch, straightening: Straightening, radius: float) -> None:
-    """Add detours around balls that are further than the balls' radius from all paths, as long as the yield is good."""
+    """Add detours around balls that are further than the balls' radius from all paths, then with half the radius, and so on."""
     known: set[tuple[int, ...]] = set()
     near: list[tuple[tuple[int, ...], Balls]] = []  # to another path, by the radius so far
-    for _ in range(_HALVINGS + 1):
-        near = [(vertices, balls) for vertices, balls in near if not selection.considered(vertices, balls, radius)]
-        num_found = _LEAST_YIELD
-        while num_found >= _LEAST_YIELD and not selection.full:
-            num_found = 0
+    for least_yield in (*[_LEAST_YIELD] * _HALVINGS, 1):
+        near = [(vertices, balls) for vertices, balls in near if not selection.consider(vertices, balls, radius)]
+        for _ in range(math.ceil(_ATTEMPTS_PER_PATH * selection.num_paths / _ATTEMPTS)):
+            num_before = len(selection.paths)
             for _ in range(_ATTEMPTS):
+                if selection.full:
+                    return
                 detour = search.vary(radius)
                 if detour is None:
                     continue
                 vertices = tuple(straightening.by_vertices(detour.path, detour.balls))
-                if vertices in known:
-                    continue
-                known.add(vertices)
-                if selection.considered(vertices, detour.balls, radius):
-                    num_found += 1
-                else:
-                    near.append((vertices, detour.balls))
-                if selection.full:
-                    return
+                if vertices not in known:
+                    known.add(vertices)
+                    if not selection.consider(vertices, detour.balls, radius):
+                        near.append((vertices, detour.balls))
+            if len(selection.paths) < num_before + least_yield:
+                break
         radius /= 2
 
 
 def _landmarks(roadmap: Roadmap, max_length: float) -> FloatArray:
     """Vertices all over the part of the roadmap where paths of a length can be."""
-    within_reach = np.flatnonzero(roadmap.distances_to(0) + roadmap.distances_to(1) <= max_length)
+    through = roadmap.distances_to(0) + roadmap.distances_to(1)
+    within_reach = np.flatnonzero(through <= max(max_length, through[0]))
     return roadmap.vertices[within_reach[np.linspace(0, len(within_reach) - 1, _NUM_LANDMARKS).astype(int)]]

@@ -66,7 +66,9 @@ def sampled(path: FloatArray, count: int) -> FloatArray:
     """Places at equal distances along a path, its ends among them; shape (count, 2)."""
     so_far = _lengths_so_far(path)
     at = so_far[-1] * (np.arange(count) / (count - 1))
-    return np.stack([np.interp(at, so_far, path[:, 0]), np.interp(at, so_far, path[:, 1])], axis=1)
+    result = np.empty((count, 2))
+    result[:, 0], result[:, 1] = np.interp(at, so_far, path[:, 0]), np.interp(at, so_far, path[:, 1])
+    return result
 
 
 def subdivided(path: FloatArray, pieces: int) -> FloatArray:

@@ -92,7 +92,7 @@ class Straightening:
 
 @lru_cache(maxsize=256)
 def _pairs(count: int, ahead: int) -> tuple[IntArray, IntArray]:
-    """All pairs of a path's places, the last of which is not too far ahead: the first ascends, and so does the last of one first."""
+    """All pairs of a path's places that are at most so many places apart, sorted."""
     first, last = np.triu_indices(count, k=1)
     near = last - first <= ahead
     return first[near], last[near]
@@ -110,7 +110,8 @@ def _shortest(places: FloatArray, first: IntArray, last: IntArray, letters: list
         That each way spells.
     """
     lengths: list[float] = np.linalg.norm(places[last] - places[first], axis=1).tolist()
-    ways = list(zip(first.tolist(), last.tolist(), lengths, letters, strict=True))
+    pairs: list[list[int]] = np.stack([first, last], axis=1).tolist()
+    ways = [(i, j, length, spelled) for (i, j), length, spelled in zip(pairs, lengths, letters, strict=True)]
     words = [Word()]  # so far, by place
     for i, j, _, spelled in ways:
         if j == i + 1:
