@@ -61,6 +61,13 @@ def test_distances_to_segments_agree_with_shapely(point: tuple[float, float], pa
     np.testing.assert_allclose(distances, expected, atol=1e-12)
 
 
+def test_distances_of_several_points_to_several_segments_are_those_of_each_pair() -> None:
+    points, starts, ends = np.random.default_rng(0).normal(size=(3, 4, 2))
+    together = distances_to_segments(points[:, None], starts, ends)
+    np.testing.assert_array_equal(together, [distances_to_segments(point, starts, ends) for point in points])
+    assert distances_to_segments(points[:0, None], starts, ends).shape == (0, 4)
+
+
 def test_a_segment_of_no_length_is_a_point() -> None:
     place = np.array([[1.0, 1.0]])
     assert distances_to_segments(np.array([4.0, 5.0]), place, place).tolist() == [5.0]

@@ -228,3 +228,13 @@ def test_a_ranking_that_counts_poses_is_called_so():
 )
 def test_other_rankings_are_not(decision):
     assert plan_stages.length_bias_hint(decision) is None
+
+
+def test_where_specks_part_some_paths_the_number_of_classes_is_a_lower_bound(topobelief, office, tmp_path):
+    """The room's pillar makes 2 classes; specks all around it, which make none, may part more paths."""
+    specks = "".join(f"{x},{y},{x + 0.05},{y + 0.05}\n" for x in range(1, 10) for y in (1, 2, 8, 9))
+    (tmp_path / "specks.csv").write_text(office.map_file.read_text() + specks)
+    arguments = office.plan("--candidates", 12, "--max-detour", 2)
+    assert ": 2 homotopy classes, " in topobelief(arguments).out
+    arguments[arguments.index(str(office.map_file))] = str(tmp_path / "specks.csv")
+    assert ": at least 2 homotopy classes, " in topobelief(arguments).out

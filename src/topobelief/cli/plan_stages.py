@@ -12,7 +12,7 @@ import numpy as np
 
 from topobelief.arrays import FloatArray
 from topobelief.candidates.diverse_paths import diverse_paths
-from topobelief.candidates.homotopy import Rays
+from topobelief.candidates.homotopy import count_classes
 from topobelief.candidates.polyline import path_length
 from topobelief.candidates.predicted_factors import default_information, predict_actions
 from topobelief.candidates.roadmap import build_roadmap
@@ -123,12 +123,13 @@ def find_candidates(
         roadmap = build_roadmap(world, start, goal, rule.num_vertices, rule.robot_radius, rule.seed)
         paths = diverse_paths(roadmap, start, goal, rule.num_paths, max_detour, rule.seed)
     lengths = [path_length(path) for path in paths]
-    rays = Rays.of_obstacles(roadmap, max_length=max(lengths))
-    num_classes = len({rays.word(path) for path in paths})
+    classes = count_classes(roadmap, paths)
+    at_least = "" if classes.is_exact else "at least "
+    num_classes = at_least + _counted(classes.number, "homotopy class", "homotopy classes")
     fewer = f" of {rule.num_paths} asked for" if len(paths) < rule.num_paths else ""
     reporter.say(
         f"{_counted(len(paths), 'path')}{fewer} from ({start[0]:.2f}, {start[1]:.2f}) to ({goal[0]:.2f}, {goal[1]:.2f}): "
-        f"{_counted(num_classes, 'homotopy class', 'homotopy classes')}, {min(lengths):.1f} to {max(lengths):.1f} m"
+        f"{num_classes}, {min(lengths):.1f} to {max(lengths):.1f} m"
     )
     with reporter.stage("factors"):
         actions = predict_actions(
