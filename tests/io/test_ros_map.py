@@ -249,9 +249,7 @@ class TestErrors:
     def test_pixels_that_no_map_has_are_named(self, tmp_path: Path, kind: str, name: str) -> None:
         path = write_map(tmp_path, image="map.tif")
         Image.fromarray(WHITE.astype(kind)).save(tmp_path / "map.tif")
-        with pytest.raises(
-            FileError, match=rf"map\.tif: expected pixels of 8 or 16 bits, got TIFF with {name}; save the map"
-        ):
+        with pytest.raises(FileError, match=rf"map\.tif: expected pixels of 8 or 16 bits, got TIFF with {name}; save the map"):
             read_ros_map(path)
 
     def test_a_pgm_with_converted_line_ends_is_refused(self, tmp_path: Path) -> None:
