@@ -255,9 +255,11 @@ class TestErrors:
     def test_a_pgm_with_converted_line_ends_is_refused(self, tmp_path: Path) -> None:
         """The line feed after the header would count as the first pixel and shift all others."""
         path = write_map(tmp_path, image="map.pgm")
-        (tmp_path / "map.pgm").write_bytes(b"P5\r\n3 2\r\n255\r\n" + bytes([0, 255, 255, 255, 255, 0]))
-        with pytest.raises(FileError, match=r"map\.pgm: .* line ends have been converted, which shifts all pixels"):
-            read_ros_map(path)
+        for largest in (255, 100):
+            pixels = bytes([0, largest, largest, largest, largest, 0])
+            (tmp_path / "map.pgm").write_bytes(b"P5\r\n3 2\r\n%d\r\n" % largest + pixels)
+            with pytest.raises(FileError, match=r"map\.pgm: .* line ends have been converted, which shifts all pixels"):
+                read_ros_map(path)
         (tmp_path / "map.pgm").write_bytes(b"P2\r\n3 2\r\n255\r\n0 255 255\r\n255 255 0\r\n")
         assert free_pixels(path) == [[False, True, True], [True, True, False]]
 

@@ -21,7 +21,7 @@ from typing import Literal
 import numpy as np
 import yaml
 from numpy.typing import ArrayLike, NDArray
-from PIL import Image, UnidentifiedImageError
+from PIL import Image, ImageFile, UnidentifiedImageError
 
 from topobelief.arrays import BoolArray, FloatArray
 from topobelief.errors import FileError, InvalidInputError, InvalidMapError, MapWarning
@@ -232,11 +232,12 @@ def _require_pixels_of_maps(image: Image.Image, path: Path) -> None:
 
 
 def _has_crlf(image: Image.Image, path: Path) -> bool:
-    """Whether the header of a PGM ends in CR LF, of which Pillow takes the LF for the first pixel."""
-    decoder, _, offset, *_ = image.tile[0]
+    """Whether the header of a binary PGM ends in CR LF, of which Pillow takes the LF for the first pixel."""
+    if not isinstance(image, ImageFile.ImageFile) or image.tile[0][0] == "ppm_plain":
+        return False
     with path.open("rb") as file:
-        file.seek(offset - 1)
-        return decoder == "raw" and file.read(2) == b"\r\n"
+        file.seek(image.tile[0][2] - 1)  # where the pixels begin
+        return file.read(2) == b"\r\n"
 
 
 def _too_large(path: Path, got: str) -> FileError:
@@ -259,7 +260,7 @@ def _kind_of_file(path: Path) -> str:
 
 def _levels(image: Image.Image) -> _Image:
     if image.mode.startswith("I"):  # 16 bits, in which Pillow keeps the largest value of a PGM at 65535
-        return _Image(np.asarray(image).astype(np.uint16), np.arange(65536) * (255 / 65535), None)
+        return _Image(np.asarray(image).astype(np.uint16), np.linspace(0, 255, 65536), None)
     if image.mode in ("1", "L") and "transparency" not in image.info:
         return _Image(np.asarray(image.convert("L")), np.arange(256.0), None)
     pixels = np.asarray(image.convert("RGBA"))
