@@ -165,8 +165,10 @@ class TestPlace:
 class TestErrors:
     @pytest.mark.parametrize("key", HEADER)
     def test_a_missing_key_is_named(self, tmp_path: Path, key: str) -> None:
-        with pytest.raises(FileError, match=rf"map\.yaml:1: expected the key '{key}' of a ROS map, got "):
+        with pytest.raises(FileError, match=rf"map\.yaml:1: expected the key '{key}' of a ROS map, got none"):
             read_ros_map(write_map(tmp_path, **{key: None}))
+        with pytest.raises(FileError, match=rf"expected the key '{key}' of a ROS map, got '{key.title()}'"):
+            read_ros_map(write_map(tmp_path, **{key: None, key.title(): "1"}))
 
     @pytest.mark.parametrize(
         ("key", "value", "message"),

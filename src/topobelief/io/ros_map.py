@@ -31,13 +31,14 @@ from topobelief.world import World
 
 Unknown = Literal["occupied", "free"]
 
+_KEYS = ("image", "mode", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
 _MODES = ("trinary", "scale", "raw")
 _OCCUPIED_COLOUR, _UNKNOWN_COLOUR, _FREE_COLOUR = 0, 205, 254  # of map_saver
 
 _DAMAGE = (ArithmeticError, EOFError, LookupError, NotImplementedError, SyntaxError, TypeError, ValueError, struct.error)
 """What Pillow's decoders raise on damaged images, besides OSError."""
 
-_MAX_PIXELS = 150_000_000  # 1.5 GB and 15 s
+_MAX_PIXELS = 150_000_000  # some 1.2 GB and 8 s
 _SMALLEST_RESOLUTION, _LARGEST_RESOLUTION = 1e-6, 1e6  # metres a pixel
 _COARSE = 2.0  # metres a pixel, above which millimetres are more likely
 _MAX_CELLS_AWAY = 1e9  # from the origin of the world, at which coordinates still tell a millionth of a cell
@@ -150,7 +151,7 @@ def _read_header(path: StrPath) -> _Header:
 
     def required(key: str) -> Field:
         if key not in fields:
-            close = get_close_matches(key, fields, n=1)
+            close = get_close_matches(key, fields.keys() - set(_KEYS), n=1)
             top.refuse(f"the key {key!r} of a ROS map", f"{close[0]!r}" if close else "none")
         return fields[key]
 
