@@ -108,6 +108,10 @@ class InvalidMapError(InvalidInputError):
     """A floor plan is malformed."""
 
 
+class MapWarning(UserWarning):
+    """A floor plan can be read, but is likely to mean something else than it says."""
+
+
 class PlanningError(TopobeliefError):
     """No path can be planned: the start or the goal is outside the map, in collision, or unreachable."""
 

@@ -306,3 +306,14 @@ def test_weights_that_almost_agree_are_not_rounded_to_one_another(family, where)
     except InvalidGraphError:
         return
     assert bounds.lower - 1e-10 <= J <= bounds.upper + 1e-10
+
+
+@pytest.mark.parametrize(("direction", "matters"), [((0, 0, 0), False), ((1, 2, -1), True)])
+def test_the_anchor_matters_on_a_line_but_not_in_one_place(direction, matters):
+    """In both I_rr before a pose is removed is singular, and the bounds are finite all the same."""
+    rng = np.random.default_rng(0)
+    poses = np.hstack([np.outer([0, 1, 3, 4], direction), rng.normal(size=(4, 4))])
+    graph = PoseGraph(poses, [(0, 1), (1, 2), (2, 3), (3, 0)], None, np.eye(6))
+    lower = [entropy_bounds(graph, anchor=anchor).lower for anchor in range(4)]
+    assert np.isfinite(lower).all()
+    assert bool(np.ptp(lower) > 1e-6) == matters

@@ -91,3 +91,16 @@ def test_a_bug_keeps_its_traceback(topobelief, office, monkeypatch):
     monkeypatch.setattr(plan_stages, "find_candidates", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         topobelief(office.plan())
+
+
+@pytest.mark.filterwarnings("default")
+def test_a_warning_is_one_line(topobelief, office, tmp_path):
+    """Here of a map in whose grey the robot stands; the goal outside ends the command."""
+    (tmp_path / "map.pgm").write_bytes(b"P5\n2 2\n255\n" + bytes([205, 205, 254, 254]))
+    (tmp_path / "map.yaml").write_text(
+        "image: map.pgm\nresolution: 2\norigin: [8, 8, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n"
+    )
+    arguments = [str(office.graph_file), "--map", "map.yaml", "--goal", "0", "5"]
+    warning, error = topobelief(["plan", *arguments]).err.splitlines()
+    assert warning.startswith("topobelief: warning: map.yaml: free_thresh 0.25 makes the grey 205 free")
+    assert error.startswith("topobelief: ")

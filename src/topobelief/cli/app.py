@@ -1,8 +1,9 @@
-"""The commands in one application, and what becomes of errors: one line and an exit code."""
+"""The commands in one application, and what becomes of errors and warnings: one line, and an exit code for errors."""
 
 from __future__ import annotations
 
 import sys
+import warnings
 from collections.abc import Sequence
 from typing import Annotated, cast
 
@@ -53,7 +54,9 @@ def _topobelief(  # pyright: ignore[reportUnusedFunction]  (typer calls it)
 def run(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code."""
     try:
-        code = app(args=None if arguments is None else list(arguments), prog_name="topobelief", standalone_mode=False)
+        with warnings.catch_warnings():
+            warnings.showwarning = _warned
+            code = app(args=None if arguments is None else list(arguments), prog_name="topobelief", standalone_mode=False)
     except (KeyboardInterrupt, typer.Abort):
         code = INTERRUPTED
     except TopobeliefError as error:
@@ -68,5 +71,13 @@ def run(arguments: Sequence[str] | None = None) -> int:
 
 
 def _failed(message: str) -> int:
-    print(f"topobelief: {' '.join(message.split())}", file=sys.stderr)
+    _say(message)
     return BAD_INPUT
+
+
+def _warned(message: Warning | str, *_: object, **__: object) -> None:
+    _say(f"warning: {message}")
+
+
+def _say(message: str) -> None:
+    print(f"topobelief: {' '.join(message.split())}", file=sys.stderr)
