@@ -24,6 +24,7 @@ from topobelief.bounds.paper import require_equal_noise
 from topobelief.errors import InvalidActionError, InvalidGraphError, InvalidInputError, require_choice
 from topobelief.graph.action import Action, check_actions, posterior
 from topobelief.graph.fisher import fisher_rows
+from topobelief.graph.fit import warn_of_misfit
 from topobelief.graph.information import SAME_NOISE, shared_information
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.graph.topology import checked_anchor
@@ -75,6 +76,11 @@ class Planner:
     DisconnectedGraphError
         Names the poses that the anchor does not reach.
 
+    Warns
+    -----
+    NotOptimizedWarning
+        Where the graph is far from its estimate (chi^2 per degree of freedom above 100).
+
     Examples
     --------
     >>> prior = PoseGraph([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [(0, 1), (1, 2)], None, np.eye(3) * 100)
@@ -111,6 +117,7 @@ class Planner:
         self._choices = (objective, signature, normalized)
         self._determinant: Determinant = determinant
         self._take(graph)
+        warn_of_misfit(graph)
         self._scratch: ScratchEvaluation | None = None
         self._incremental: IncrementalEvaluation | None = None
 

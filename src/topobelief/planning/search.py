@@ -13,7 +13,7 @@ import numpy as np
 
 from topobelief.arrays import FloatArray
 from topobelief.errors import IllConditionedError
-from topobelief.graph.action import Action
+from topobelief.graph.action import Action, driven_lengths
 from topobelief.planning.decision import Candidate, Decision
 from topobelief.planning.evaluation import Evaluation
 
@@ -193,22 +193,13 @@ class Search:
             proven_optimal=proven,
             candidates=tuple(
                 Candidate(action.label, action.num_new_poses, action.num_closures, length, action.cost)
-                for action, length in zip(self._actions, self._lengths(), strict=True)
+                for action, length in zip(self._actions, driven_lengths(session.graph, self._actions), strict=True)
             ),
             objective=session.objective,
             signature=session.signature,
             bounds=session.family,
             determinant=session.determinant,
         )
-
-    def _lengths(self) -> list[float]:
-        """Of the paths along each action's new poses, from the graph's last one on."""
-        graph, num_new = self._evaluation.graph, [action.num_new_poses for action in self._actions]
-        k, which = graph.group.position_dim, np.repeat(np.arange(len(num_new)), num_new)
-        path = np.concatenate([np.zeros((0, k)), *(action.poses[:, :k] for action in self._actions if action.num_new_poses)])
-        before = np.roll(path, 1, axis=0)
-        before[np.diff(which, prepend=-1) > 0] = graph.positions[-1]
-        return np.bincount(which, weights=np.linalg.norm(path - before, axis=1), minlength=len(num_new)).tolist()
 
 
 def _descending(scores: FloatArray, *, tolerance: float) -> list[int]:

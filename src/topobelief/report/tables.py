@@ -25,7 +25,8 @@ def candidate_table(decision: Decision) -> Table:
         padding=(0, 1),
         collapse_padding=True,
         pad_edge=False,
-        caption=f"lower, upper: bounds of the {decision.objective} entropy in {unit}; the less, the better",
+        caption=f"lower, upper: bounds of the {decision.objective} entropy in {unit}; the less, the better.\n"
+        "Actions without a label go by their index, which counts from 0, as do the labels of paths.",
         caption_justify="left",
     )
     columns = ["signature", "lower", "upper"]
