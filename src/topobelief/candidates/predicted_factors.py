@@ -38,7 +38,7 @@ def predict_actions(
     closure_angle: float = math.pi,
     min_index_gap: int = 5,
     world: World | None = None,
-    start: int | ArrayLike | None = None,
+    start: int | ArrayLike | Start | None = None,
 ) -> list[Action]:
     """One action a path, for a robot that stands at the graph's last pose unless told otherwise.
 

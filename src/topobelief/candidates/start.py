@@ -29,7 +29,7 @@ class Start:
         return distance if distance > _SAME_PLACE else 0.0
 
 
-def find_start(graph: PoseGraph, start: int | ArrayLike | None = None, *, world: World | None = None) -> Start:
+def find_start(graph: PoseGraph, start: int | ArrayLike | Start | None = None, *, world: World | None = None) -> Start:
     """The start that a caller means.
 
     Parameters
@@ -37,7 +37,7 @@ def find_start(graph: PoseGraph, start: int | ArrayLike | None = None, *, world:
     graph
     start
         Index of a pose (counted from the end where it is negative), or a place of shape (2,) or (3,), metres, whose heading
-        is ignored. Default: the last pose.
+        is ignored. Default: the last pose. What this function returned is taken as it is.
     world
         Where given, a place must be in sight of a pose.
 
@@ -54,6 +54,8 @@ def find_start(graph: PoseGraph, start: int | ArrayLike | None = None, *, world:
     PlanningError
         Where no pose is in sight of the place.
     """
+    if isinstance(start, Start):
+        return start
     if start is None or isinstance(start, Integral):
         index = -1 if start is None else int(start)
         if not -graph.num_poses <= index < graph.num_poses:

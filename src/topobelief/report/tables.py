@@ -26,7 +26,7 @@ def candidate_table(decision: Decision) -> Table:
         collapse_padding=True,
         pad_edge=False,
         caption=f"lower, upper: bounds of the {decision.objective} entropy in {unit}; the less, the better.\n"
-        "Actions without a label go by their index, which counts from 0, as do the labels of paths.",
+        "Paths are numbered from 0.",
         caption_justify="left",
     )
     columns = ["signature", "lower", "upper"]
