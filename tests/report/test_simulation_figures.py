@@ -109,4 +109,4 @@ def test_a_run_in_words():
     table = shown(metrics_table(record))
     assert f"{metrics['error_slam']:.3f} m on all poses" in table
     assert "0.036% of the time driven" in table
-    assert leg_line(record.legs[1]) == "goal 2: path 1 of 2 (10.0 m); arrived after 10.2 m in 20 s with 1 loop closures"
+    assert leg_line(record.legs[1]) == "goal 2: path 0 of 2 (10.0 m); arrived after 10.2 m in 20 s with 1 loop closures"

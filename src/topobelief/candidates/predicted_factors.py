@@ -219,6 +219,7 @@ def _closures(
 
 def _steps_between(pairs: IntArray, num_old: int, start: int) -> FloatArray:
     """Steps from each old pose along the graph to the start and on to the new pose; inf from poses behind the start."""
-    new, old = pairs.T
-    in_order = np.where(old < num_old, old + num_old - 1 - start, old)  # as if the start were the last of the old poses
-    return np.where((old > start) & (old < num_old), np.inf, new - in_order)
+    new, old = pairs[:, 0], pairs[:, 1]
+    is_old = old < num_old
+    steps = new - old - (num_old - 1 - start) * is_old  # as if the start were the last of the old poses
+    return np.where(is_old & (old > start), np.inf, steps)

@@ -17,7 +17,8 @@ class Command(TyperCommand):
         _, _, order = self.make_parser(ctx).parse_args(args=list(args))
         for parameter, count in Counter(order).items():
             if count > 1 and not getattr(parameter, "multiple", True) and not getattr(parameter, "is_flag", True):
-                raise typer.BadParameter(f"expected it once, got it {count} times.", ctx=ctx, param=parameter)
+                times = "twice" if count == 2 else f"{count} times"
+                raise typer.BadParameter(f"expected it once, got it {times}.", ctx=ctx, param_hint=f"'{parameter.opts[0]}'")
         return super().parse_args(ctx, args)
 
 

@@ -70,7 +70,8 @@ def _heading_noise(value: float | None) -> float | None:
 
 
 def _radians(value: float | None, largest: float) -> float | None:
-    if _above_zero(value) is not None and value > largest:  # pyright: ignore[reportOptionalOperand]
+    value = _above_zero(value)
+    if value is not None and value > largest:
         raise typer.BadParameter(f"expected at most {largest:.6g}, got {value:g}{degrees_hint(value)}.")
     return value
 

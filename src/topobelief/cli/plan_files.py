@@ -17,6 +17,7 @@ from topobelief.arrays import FloatArray
 from topobelief.candidates.polyline import path_length, path_poses
 from topobelief.candidates.start import Start
 from topobelief.cli.console import Reporter
+from topobelief.cli.plan import GivenStart
 from topobelief.cli.plan_stages import CandidateRule, Candidates
 from topobelief.errors import FileError
 from topobelief.graph.pose_graph import PoseGraph
@@ -94,7 +95,7 @@ def _plain(value: object) -> object:
         return None
     if isinstance(value, np.ndarray):
         return value.tolist()
-    return value if value is None or isinstance(value, int | float | str | list | tuple) else str(value)
+    return str(value) if isinstance(value, Path | GivenStart) else value
 
 
 def write(folder: Path, result: PlanResult, reporter: Reporter) -> None:
