@@ -35,7 +35,7 @@ def test_every_command_has_help(topobelief, command):
     assert "GRAPH" in outcome.out
 
 
-@pytest.mark.parametrize("command", ["plan", "info"])
+@pytest.mark.parametrize("command", ["plan", "info", "simulate", "simulate-compare", "reproduce", "study", "benchmark"])
 def test_help_is_whole_in_a_terminal_of_80_columns(topobelief, monkeypatch, command):
     """No option, choice or text is cut off, which the help marks by an ellipsis behind a letter."""
     monkeypatch.setenv("COLUMNS", "80")
