@@ -1,6 +1,7 @@
 from .bounds.entropy_bounds import Bounds as Bounds
 from .bounds.entropy_bounds import entropy_bounds as entropy_bounds
 from .candidates.diverse_paths import diverse_paths as diverse_paths
+from .candidates.polyline import path_poses as path_poses
 from .candidates.predicted_factors import default_information as default_information
 from .candidates.predicted_factors import predict_actions as predict_actions
 from .candidates.roadmap import Roadmap as Roadmap

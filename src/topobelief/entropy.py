@@ -10,6 +10,7 @@ information is held whichever is asked for (on a real graph with one information
 from __future__ import annotations
 
 from topobelief.forms.of_graph import GraphForms
+from topobelief.graph.fit import warn_of_misfit
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.graph.topology import checked_anchor
 from topobelief.linalg.estimate import LOG_2_PI_E, Estimate, Number
@@ -39,6 +40,11 @@ def joint_entropy(graph: PoseGraph, *, anchor: int = 0) -> float:
     IllConditionedError
         If double precision cannot give J to 0.1 nats.
 
+    Warns
+    -----
+    NotOptimizedWarning
+        Where the poses are far from the estimate (chi^2 per degree of freedom above 100).
+
     Examples
     --------
     >>> import numpy as np
@@ -47,7 +53,9 @@ def joint_entropy(graph: PoseGraph, *, anchor: int = 0) -> float:
     >>> round(joint_entropy(chain), 6)  # a tree: 3 ln(2 pi e) - ln|Omega|
     -6.688174
     """
-    return joint_entropy_estimate(graph, anchor=anchor).value
+    entropy = joint_entropy_estimate(graph, anchor=anchor).value
+    warn_of_misfit(graph)
+    return entropy
 
 
 def joint_entropy_estimate(graph: PoseGraph, *, anchor: int = 0) -> Estimate[float]:

@@ -6,6 +6,7 @@ and then what to do. The values that it names are attributes too, so that a prog
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from os import PathLike, fspath
 
@@ -114,6 +115,17 @@ class MapWarning(UserWarning):
 
 class PlanningError(TopobeliefError):
     """No path can be planned: the start or the goal is outside the map, in collision, or unreachable."""
+
+
+def degrees_hint(angle: float) -> str:
+    """What to add to an error about an angle that is too large: it may be in degrees."""
+    if not math.isfinite(angle):
+        return ""
+    return f"; angles are in radians, and {angle:g} degrees are {math.radians(angle):.4g} radians"
+
+
+class NotOptimizedWarning(UserWarning):
+    """Entropies or bounds are asked for at poses that are far from the maximum-likelihood estimate."""
 
 
 def require_choice(name: str, value: str, choices: Collection[str]) -> None:

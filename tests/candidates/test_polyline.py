@@ -12,11 +12,20 @@ from topobelief.candidates.polyline import (
     checked_path,
     distances_to_segments,
     path_length,
+    path_poses,
     sampled,
     stations,
     subdivided,
 )
 from topobelief.errors import InvalidInputError
+
+
+def test_poses_of_a_path_head_as_they_came() -> None:
+    """A repeated waypoint counts once."""
+    poses = path_poses([(0, 0), (0, 0), (3, 0), (3, 1), (2, 1)])
+    np.testing.assert_allclose(poses, [(0, 0, 0), (3, 0, 0), (3, 1, np.pi / 2), (2, 1, np.pi)])
+    assert path_poses([(4, 5)]).tolist() == [[4, 5, 0]]
+
 
 coordinates = st.integers(-20, 20).map(lambda value: value / 4)
 paths = st.lists(st.tuples(coordinates, coordinates), min_size=2, max_size=8, unique=True).map(np.array)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from importlib.metadata import version
@@ -33,6 +34,29 @@ def test_every_command_has_help(topobelief, command):
     outcome = topobelief([command, "--help"])
     assert outcome.code == 0
     assert "GRAPH" in outcome.out
+
+
+@pytest.mark.parametrize("command", ["plan", "info", "simulate", "simulate-compare", "reproduce", "study", "benchmark"])
+def test_help_is_whole_in_a_terminal_of_80_columns(topobelief, monkeypatch, command):
+    """No option, choice or text is cut off, which the help marks by an ellipsis behind a letter."""
+    monkeypatch.setenv("COLUMNS", "80")
+    shown = topobelief([command, "--help"]).out
+    assert max(map(len, shown.splitlines())) <= 80
+    assert not re.search(r"[\w-]…", shown)
+    words = set(re.split(r"[\s,;:.]+", shown))
+    if command == "plan":
+        kinds = (plan.Objective, plan.Signature, plan.Family, plan.Determinant, plan.Proof, plan.Unknown)
+        assert {"--no-line-of-sight", "--allow-dense-spectrum", "--max-evaluations"} <= words
+        assert {choice for kind in kinds for choice in get_args(kind)} <= words
+
+
+def test_a_shell_completes_options(office):
+    """As bash asks for it once `--install-completion` has run."""
+    code = "import sys; from topobelief.cli import main; main()"
+    asked = {"_TOPOBELIEF_COMPLETE": "complete_bash", "COMP_WORDS": "topobelief plan --clos", "COMP_CWORD": "2"}
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env={**os.environ, **asked})
+    assert result.stdout.split() == ["--closure-radius", "--closure-angle"]
+    assert result.stderr == ""
 
 
 def test_help_loads_nothing_heavy():

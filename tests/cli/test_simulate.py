@@ -16,6 +16,7 @@ from topobelief.cli.interruption import stop_on_interrupt
 from topobelief.cli.simulate import Objective
 from topobelief.io.g2o import read_g2o
 from topobelief.io.ros_map import read_ros_map
+from topobelief.planning.decision import SCHEMA
 from topobelief.planning.registry import OBJECTIVES
 
 ROOM = """map: walls.csv
@@ -55,7 +56,7 @@ def test_a_run_leaves_everything(topobelief, room, tmp_path):
     assert document["outcome"] == "arrived"
     assert graph.num_poses == document["metrics"]["poses"] == len(rows)
     np.testing.assert_allclose([float(row["graph_x"]) for row in rows], graph.poses[:, 0], atol=1e-6)
-    assert json.loads((run / "leg-2.json").read_text())["decision"]["schema"] == "topobelief.decision/1"
+    assert json.loads((run / "leg-2.json").read_text())["decision"]["schema"] == SCHEMA
     world = read_ros_map(run / "map.yaml")
     true_places = np.array([[float(row["true_x"]), float(row["true_y"])] for row in rows])
     assert world.contains(true_places).all()

@@ -120,7 +120,7 @@ def test_a_run_in_words():
     assert f"{metrics['error_slam']:.3f} m on all poses" in table
     assert "0.036% of the time driven" in table
     assert leg_line(record.legs[1]) == (
-        "goal 2: path 1 of 2 (10.0 m); arrived after 10.2 m in 20 s with 1 loop closures, "
+        "goal 2: path 0 of 2 (10.0 m); arrived after 10.2 m in 20 s with 1 loop closures, "
         "0.21 m from the goal (0.11 m as the robot believes)"
     )
     assert "at most 0.21 m, as the robot believes 0.12 m" in table

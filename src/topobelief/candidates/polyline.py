@@ -62,6 +62,30 @@ def stations(path: FloatArray, distances: FloatArray) -> Stations:
     return Stations(path[leg] + share[:, None] * step, np.arctan2(step[:, 1], step[:, 0]))
 
 
+def path_poses(path: ArrayLike) -> FloatArray:
+    """A path as poses: its waypoints, each with the direction in which the robot came, the first with that in which it leaves.
+
+    Parameters
+    ----------
+    path : shape (waypoints, 2)
+        Metres. Between two waypoints it is straight.
+
+    Returns
+    -------
+    shape (waypoints, 3)
+        x, y in metres and yaw in radians, world frame; repeated waypoints once. The yaw of a path of one waypoint is 0.
+
+    Examples
+    --------
+    >>> path_poses([(0, 0), (2, 0), (2, 1)]).round(3).tolist()
+    [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [2.0, 1.0, 1.571]]
+    """
+    waypoints = checked_path(path)
+    if len(waypoints) == 1:
+        return np.column_stack([waypoints, np.zeros(1)])
+    return np.column_stack([waypoints, stations(waypoints, _lengths_so_far(waypoints)).headings])
+
+
 def sampled(path: FloatArray, count: int) -> FloatArray:
     """Places at equal distances along a path, its ends among them; shape (count, 2)."""
     so_far = _lengths_so_far(path)

@@ -10,6 +10,7 @@ from typing import Annotated, cast
 import typer
 
 from topobelief.cli.benchmark import benchmark
+from topobelief.cli.command import Command, StartCommand
 from topobelief.cli.info import info
 from topobelief.cli.plan import plan
 from topobelief.cli.reproduce import reproduce
@@ -23,15 +24,15 @@ INTERRUPTED = 130
 # what all errors about options derive from, which typer does not export
 _UsageError = cast("type[Exception]", typer.BadParameter.__mro__[1])
 
-app = typer.Typer(name="topobelief", add_completion=False, pretty_exceptions_enable=False)
-app.command()(plan)
-app.command()(info)
-app.command()(benchmark)
-app.command()(reproduce)
-app.command()(simulate)
-app.command()(simulate_compare)
-app.command()(study)
-app.command()(study_report)
+app = typer.Typer(name="topobelief", pretty_exceptions_enable=False)
+app.command(cls=StartCommand)(plan)
+app.command(cls=Command)(info)
+app.command(cls=Command)(benchmark)
+app.command(cls=Command)(reproduce)
+app.command(cls=Command)(simulate)
+app.command(cls=Command)(simulate_compare)
+app.command(cls=Command)(study)
+app.command(cls=Command)(study_report)
 
 
 @app.callback(invoke_without_command=True)

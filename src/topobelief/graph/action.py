@@ -35,6 +35,8 @@ class Action(ReadOnlyArrays):
         What a person calls the action.
     cost
         A deterministic cost (length, energy, time), in nats; it adds to the entropy and to its bounds.
+    length
+        How far the robot drives, metres; it is told and has no influence. Default: from pose to pose (`driven_lengths`).
 
     Raises
     ------
@@ -47,6 +49,7 @@ class Action(ReadOnlyArrays):
     information: FloatArray
     label: str
     cost: float
+    length: float | None
 
     def __init__(
         self,
@@ -56,6 +59,7 @@ class Action(ReadOnlyArrays):
         *,
         label: str = "",
         cost: float = 0.0,
+        length: float | None = None,
     ) -> None:
         try:
             raw_information = frozen_floats(information, name="information")
@@ -81,12 +85,15 @@ class Action(ReadOnlyArrays):
             raise InvalidActionError("expected indices from 0, got a negative one", edge=int(negative[0]), label=label)
         if not np.isfinite(cost):
             raise InvalidActionError(f"expected a finite cost in nats, got {cost}", label=label)
+        if length is not None and not (0 <= length < np.inf):
+            raise InvalidActionError(f"expected a length of at least 0 m, got {length}", label=label)
         for name, value in (
             ("poses", checked_poses),
             ("edges", checked_edges),
             ("information", checked),
             ("label", label),
             ("cost", float(cost)),
+            ("length", None if length is None else float(length)),
         ):
             object.__setattr__(self, name, value)
 
@@ -190,6 +197,23 @@ def _all_fit(graph: PoseGraph, actions: Sequence[Action]) -> bool:
     contracted = contracted[contracted[:, 0] != contracted[:, 1]]
     labels = Topology(int(num_new.sum()) + 1, contracted).component_labels
     return bool((labels == labels[0]).all())
+
+
+def driven_lengths(graph: PoseGraph, actions: Sequence[Action]) -> list[float]:
+    """How far the robot drives in each action, metres: as the action says or, where it does not, along its new poses.
+
+    Those are taken in their order, from the old pose that the first of them is joined to by the earliest such edge.
+    """
+    return [_length_from_pose_to_pose(graph, action) if action.length is None else action.length for action in actions]
+
+
+def _length_from_pose_to_pose(graph: PoseGraph, action: Action) -> float:
+    if action.num_new_poses == 0:
+        return 0.0
+    low, high = np.sort(action.edges, axis=1).T
+    start = low[(low < graph.num_poses) & (high == graph.num_poses)][:1]  # empty where only later poses hang on the graph
+    path = np.concatenate([graph.positions[start], graph.group.position(action.poses)])
+    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
 
 
 def posterior(graph: PoseGraph, action: Action) -> PoseGraph:

@@ -25,6 +25,7 @@ from topobelief.bounds.options import BoundOptions, Determinant
 from topobelief.bounds.paper import require_equal_noise
 from topobelief.errors import InvalidActionError, InvalidGraphError, InvalidInputError, require_choice
 from topobelief.graph.action import Action, check_actions
+from topobelief.graph.fit import warn_of_misfit
 from topobelief.graph.information import SAME_NOISE, shared_information
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.graph.topology import checked_anchor
@@ -83,6 +84,11 @@ class Planner:
     DisconnectedGraphError
         Names the poses that the anchor does not reach.
 
+    Warns
+    -----
+    NotOptimizedWarning
+        Where the graph is far from its estimate (chi^2 per degree of freedom above 100).
+
     Examples
     --------
     >>> prior = PoseGraph([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [(0, 1), (1, 2)], None, np.eye(3) * 100)
@@ -120,6 +126,7 @@ class Planner:
         self._allow_dense_spectrum = allow_dense_spectrum
         self._engines: dict[str, Engine] = {}
         self._graph, self._anchor = graph, self._checked(graph)
+        warn_of_misfit(graph)
 
     def __getstate__(self) -> dict[str, Any]:
         return {**vars(self), "_engines": {}}

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from topobelief.arrays import FloatArray, IntArray
-from topobelief.graph.action import Action
+from topobelief.graph.action import Action, driven_lengths
 from topobelief.linalg.estimate import Estimate
 from topobelief.planning.batch import Batch, Criteria
 from topobelief.planning.decision import Candidate, Decision
@@ -235,19 +235,10 @@ class Search:
             proven_optimal=proven,
             candidates=tuple(
                 Candidate(action.label, action.num_new_poses, action.num_closures, length, action.cost)
-                for action, length in zip(self._actions, self._lengths(), strict=True)
+                for action, length in zip(self._actions, driven_lengths(self._engine.graph, self._actions), strict=True)
             ),
             objective=criteria.objective,
             signature=criteria.signature,
             bounds=criteria.bounds,
             determinant=criteria.options.determinant,
         )
-
-    def _lengths(self) -> list[float]:
-        """Of the paths along each action's new poses, from the graph's last one on."""
-        graph, num_new = self._engine.graph, [action.num_new_poses for action in self._actions]
-        k, which = graph.group.position_dim, np.repeat(np.arange(len(num_new)), num_new)
-        path = np.concatenate([np.zeros((0, k)), *(action.poses[:, :k] for action in self._actions if action.num_new_poses)])
-        before = np.roll(path, 1, axis=0)
-        before[np.diff(which, prepend=-1) > 0] = graph.positions[-1]
-        return np.bincount(which, weights=np.linalg.norm(path - before, axis=1), minlength=len(num_new)).tolist()

@@ -18,7 +18,7 @@ from topobelief.simulation.record import Leg, Record
 def leg_line(leg: Leg) -> str:
     """What was chosen on the way to a goal, and what came of it."""
     head = f"goal {leg.goal}" if leg.goal else "approach"
-    chosen = f"path {leg.chosen + 1} of {leg.num_candidates} ({leg.planned:.1f} m); " if leg.num_candidates else ""
+    chosen = f"path {leg.chosen} of {leg.num_candidates} ({leg.planned:.1f} m); " if leg.num_candidates else ""
     driven = ""
     if leg.driven_seconds:
         driven = f" after {leg.distance:.1f} m in {leg.driven_seconds:.0f} s with {leg.num_closures} loop closures"
