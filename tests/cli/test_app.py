@@ -45,9 +45,10 @@ def test_help_is_whole_in_a_terminal_of_80_columns(topobelief, monkeypatch, comm
     assert not re.search(r"[\w-]…", shown)
     words = set(re.split(r"[\s,;:.]+", shown))
     if command == "plan":
-        kinds = (plan.Objective, plan.Signature, plan.Family, plan.Determinant, plan.Proof, plan.Unknown)
+        kinds = (plan.Determinant, plan.Proof, plan.Unknown)
         assert {"--no-line-of-sight", "--allow-dense-spectrum", "--max-evaluations"} <= words
         assert {choice for kind in kinds for choice in get_args(kind)} <= words
+        assert {*OBJECTIVES, *SIGNATURES, *BOUNDS, AUTO} <= words
 
 
 def test_a_shell_completes_options(office):
@@ -79,9 +80,6 @@ def test_the_entry_point_exits_with_the_code(capsys):
 @pytest.mark.parametrize(
     ("offered", "known"),
     [
-        (plan.Objective, OBJECTIVES),
-        (plan.Signature, SIGNATURES),
-        (plan.Family, (*BOUNDS, AUTO)),
         (plan.Determinant, get_args(Determinant)),
         (plan.Proof, get_args(planner.Proof)),
         (plan.Unknown, get_args(ros_map.Unknown)),

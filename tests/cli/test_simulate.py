@@ -7,17 +7,14 @@ import json
 import os
 import signal
 from pathlib import Path
-from typing import get_args
 
 import numpy as np
 import pytest
 
 from topobelief.cli.interruption import stop_on_interrupt
-from topobelief.cli.simulate import Objective
 from topobelief.io.g2o import read_g2o
 from topobelief.io.ros_map import read_ros_map
 from topobelief.planning.decision import SCHEMA
-from topobelief.planning.registry import OBJECTIVES
 
 ROOM = """map: walls.csv
 start: [1.5, 1.5]
@@ -32,10 +29,6 @@ def room(tmp_path) -> Path:
     path = tmp_path / "room.yaml"
     path.write_text(ROOM)
     return path
-
-
-def test_objectives_are_the_planners():
-    assert get_args(Objective) == tuple(OBJECTIVES)
 
 
 def test_a_run_leaves_everything(topobelief, room, tmp_path):

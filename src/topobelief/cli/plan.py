@@ -10,12 +10,11 @@ from typing import Annotated, Literal
 
 import typer
 
+from topobelief.cli.choices import completed, one_of
 from topobelief.errors import NotOptimizedWarning, degrees_hint
+from topobelief.planning.registry import AUTO, BOUNDS, OBJECTIVES, SIGNATURES
 
 # The planner's own choices, repeated so that help need not load it; a test holds them together.
-Objective = Literal["joint", "map", "per_pose"]
-Signature = Literal["spanning_trees", "von_neumann", "von_neumann_approx"]
-Family = Literal["paper", "fischer", "fischer_step", "anchored", "chain", "auto"]
 Determinant = Literal["cholesky", "hadamard"]
 Proof = Literal["none", "bounded", "optimal"]
 Unknown = Literal["occupied", "free"]
@@ -221,16 +220,20 @@ def plan(
         ),
     ] = False,
     objective: Annotated[
-        Objective,
+        str,
         typer.Option(
+            callback=one_of(OBJECTIVES),
+            autocompletion=completed(OBJECTIVES),
             metavar="NAME",
             help="Entropy to minimise: joint, of all poses (the paper's); map, of those that exist now; or per_pose.",
             rich_help_panel=_DECISION,
         ),
     ] = "joint",
     signature: Annotated[
-        Signature,
+        str,
         typer.Option(
+            callback=one_of(SIGNATURES),
+            autocompletion=completed(SIGNATURES),
             metavar="NAME",
             help="What ranks the paths: spanning_trees, von_neumann or von_neumann_approx.",
             rich_help_panel=_DECISION,
@@ -262,10 +265,13 @@ def plan(
         typer.Option(metavar="S", help="Seconds for the decision.", callback=_above_zero, rich_help_panel=_DECISION),
     ] = None,
     bounds: Annotated[
-        Family,
+        str,
         typer.Option(
+            callback=one_of((*BOUNDS, AUTO)),
+            autocompletion=completed((*BOUNDS, AUTO)),
             metavar="NAME",
-            help="Family of bounds: fischer; paper, for equal noise; anchored, with numba; auto, what proves for less.",
+            help="Family of bounds: fischer; fischer_step, tighter; paper, for equal noise; anchored and chain, tightest; "
+            "auto, what proves for less.",
             rich_help_panel=_PROOF,
         ),
     ] = "fischer",

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
-# The planner's own choices, repeated so that help need not load it; a test holds them together.
-Objective = Literal["joint", "map", "per_pose"]
+from topobelief.cli.choices import completed, one_of
+from topobelief.planning.registry import OBJECTIVES
 
 _SCENARIO_HELP = "office, lab, corridors, or a .yaml of your own."
 _NOISE_HELP = 'physical; or injected: the ratio ξ = σ_θ/σ_p at σ_p = 0.1 m, such as 0.35, or "σ_p,σ_θ" in m and rad.'
@@ -24,7 +24,12 @@ def simulate(
         ),
     ] = "spanning_trees",
     objective: Annotated[
-        Objective, typer.Option(help="Entropy to minimise: of all poses (the paper's), of those that exist now, or per pose.")
+        str,
+        typer.Option(
+            callback=one_of(OBJECTIVES),
+            autocompletion=completed(OBJECTIVES),
+            help="Entropy to minimise: of all poses (the paper's), of those that exist now, or per pose.",
+        ),
     ] = "joint",
     seed: Annotated[int, typer.Option(min=0, help="The same seed, the same run.")] = 0,
     noise: Annotated[str, typer.Option(help=_NOISE_HELP)] = "physical",
@@ -113,7 +118,9 @@ def simulate_compare(
     strategies: Annotated[str, typer.Option(help="By commas; the first is what the others are compared with.")] = (
         "shortest,spanning_trees"
     ),
-    objective: Annotated[Objective, typer.Option(help="As for simulate.")] = "joint",
+    objective: Annotated[
+        str, typer.Option(callback=one_of(OBJECTIVES), autocompletion=completed(OBJECTIVES), help="As for simulate.")
+    ] = "joint",
     seeds: Annotated[int, typer.Option(min=1, help="How many, from 0 on.")] = 20,
     noise: Annotated[str, typer.Option(help="Injected, as for simulate; redrawn for each recorded graph.")] = "0.35",
     redraws: Annotated[int, typer.Option(min=1, help="Of the noise, for each recorded graph.")] = 50,
