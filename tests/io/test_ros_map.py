@@ -337,3 +337,9 @@ class TestWriting:
         with pytest.raises(InvalidInputError, match=message):
             write_ros_map(tmp_path / name, np.zeros((2, 2)), resolution=0.05, origin=origin)
         assert not list(tmp_path.iterdir())
+
+    def test_both_files_are_written_or_none(self, tmp_path: Path) -> None:
+        (tmp_path / "map.yaml").mkdir()
+        with pytest.raises(FileError, match=r"map\.yaml: expected a file to write, got a directory"):
+            write_ros_map(tmp_path / "map.yaml", np.zeros((2, 2)), resolution=0.05)
+        assert [path.name for path in tmp_path.iterdir()] == ["map.yaml"]

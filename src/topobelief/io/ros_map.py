@@ -25,7 +25,7 @@ from PIL import Image, ImageFile, UnidentifiedImageError
 
 from topobelief.arrays import BoolArray, FloatArray
 from topobelief.errors import FileError, InvalidInputError, InvalidMapError, MapWarning
-from topobelief.io.files import StrPath, atomic_file, write_text
+from topobelief.io.files import StrPath, atomic_file
 from topobelief.io.yaml_fields import Field, read_fields
 from topobelief.world import World
 
@@ -111,8 +111,6 @@ def write_ros_map(
         raise InvalidInputError(f"expected a file that ends in .yaml or .yml, got {Path(path).name!r}")
     colour = np.select([cells == 100, cells == 0], [_OCCUPIED_COLOUR, _FREE_COLOUR], _UNKNOWN_COLOUR).astype(np.uint8)
     image = Path(path).with_suffix(".pgm")
-    with atomic_file(image) as temporary:
-        Image.fromarray(colour[::-1]).save(temporary)  # images start at the top
     header: dict[str, object] = {
         "image": image.name,
         "mode": "trinary",
@@ -122,7 +120,9 @@ def write_ros_map(
         "occupied_thresh": 0.65,
         "free_thresh": 0.196,
     }
-    write_text(path, yaml.safe_dump(header, sort_keys=False))
+    with atomic_file(path) as temporary_header, atomic_file(image) as temporary_image:  # both files or none
+        Image.fromarray(colour[::-1]).save(temporary_image)  # images start at the top
+        temporary_header.write_text(yaml.safe_dump(header, sort_keys=False), encoding="utf-8", newline="\n")
 
 
 @dataclass(frozen=True, slots=True)
