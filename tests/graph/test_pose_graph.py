@@ -164,3 +164,28 @@ def test_the_last_digit_of_an_asymmetric_matrix_does_not_matter_twice():
     given_, transposed = (PoseGraph(LINE, CHAIN, None, matrix).information for matrix in (omega, omega.T))
     assert np.array_equal(given_, given_.transpose(0, 2, 1))
     assert np.array_equal(given_, transposed)
+
+
+X = ord("x") << 56
+
+
+@pytest.mark.parametrize(
+    ("ids", "edges", "end"),
+    [
+        ([0, 1, 2, 3], [(0, 1), (2, 1), (2, 3), (0, 3)], 3),
+        ([10, 20, 30, 45], [(0, 1), (1, 2), (2, 3)], 3),
+        ([0, 1, 2, 1007], [(0, 1), (1, 2), (2, 3), (0, 3)], 2),
+        ([3, X, X + 1, X + 2], [(0, 1), (1, 2), (2, 3)], 3),
+        ([0, 1, 2, 3], [(0, 1), (2, 3), (0, 3)], 1),
+        ([0, 1, 2, 3], [(0, 2), (1, 3), (0, 3)], None),
+    ],
+    ids=["loop", "gaps", "tag", "symbols after a tag", "broken", "no odometry"],
+)
+def test_the_robot_is_where_odometry_ends(ids, edges, end):
+    """The chain follows edges from each pose to the next, and stops at a gap or at an id that is far from all others."""
+    poses = [[k, 0, 0] for k in range(4)]
+    assert PoseGraph(poses, edges, None, EYE, ids=ids).odometry_end == end
+
+
+def test_a_single_pose_is_where_the_robot_is():
+    assert PoseGraph([[0, 0, 0]], [], None, EYE).odometry_end == 0

@@ -19,6 +19,8 @@ from topobelief.geometry import Group, group_of_size
 from topobelief.graph.information import checked_information
 from topobelief.graph.topology import Topology
 
+_LARGEST_ID_JUMP = 100  # times the usual step of ids: what lies further on is a tag, a landmark or another robot
+
 
 @dataclass(frozen=True, eq=False, init=False)
 class PoseGraph:
@@ -155,6 +157,27 @@ class PoseGraph:
     def degrees_of_freedom(self) -> int:
         """kappa (m - (n - 1)): measured numbers beyond those that fix the free poses."""
         return self.tangent_dim * (self.num_edges - self.num_poses + 1)
+
+    @cached_property
+    def odometry_end(self) -> int | None:
+        """Index of the pose where the robot is, as far as the graph says; None where no edge joins a pose to the next.
+
+        The chain of odometry begins at the first pose that an edge joins to the next one, and goes on for as long as an edge
+        joins each pose to the next. A pose whose id jumps by more than 100 times the usual step (the median over such edges)
+        does not belong to it. A single pose is its own end.
+        """
+        if self.num_poses == 1:
+            return 0
+        low, high = np.sort(self.edges, axis=1).T
+        joined = np.zeros(self.num_poses - 1, dtype=np.bool_)  # pose k to pose k + 1
+        joined[low[high - low == 1]] = True
+        if not joined.any():
+            return None
+        jumps = np.abs(np.diff(self.ids))
+        joined &= jumps <= _LARGEST_ID_JUMP * np.median(jumps[joined])
+        begin = int(np.argmax(joined))
+        breaks = np.flatnonzero(~joined[begin:])
+        return begin + int(breaks[0]) if breaks.size else self.num_poses - 1
 
     @cached_property
     def chi2(self) -> float:
