@@ -35,14 +35,8 @@ def test_a_lifted_graph_comes_back(planar: PoseGraph):
     rest = np.random.default_rng(6).normal(size=(6, 6, 6))
     information = rest @ rest.transpose(0, 2, 1) + 40 * np.eye(6)
     information[:, np.array(PLANAR)[:, None], PLANAR] = planar.information + 40 * np.eye(3)
-    graph = PoseGraph(
-        lifted(planar.poses, 0.7),
-        planar.edges,
-        lifted(planar.measurements, 0.1),
-        information,
-        ids=planar.ids,
-        fixed=planar.fixed,
-    )
+    poses, measured = lifted(planar.poses, 0.7), lifted(planar.measurements, 0.1)
+    graph = PoseGraph(poses, planar.edges, measured, information, ids=planar.ids, fixed=planar.fixed)
     back, dropped = projected_to_plane(graph)
     np.testing.assert_allclose(back.poses, planar.poses, atol=1e-12)
     np.testing.assert_allclose(back.measurements, planar.measurements, atol=1e-12)

@@ -198,15 +198,9 @@ def test_a_component_may_have_no_vertex_lines(filed):
 
 
 def test_components_and_messages_know_symbols(filed):
-    text = (
-        SQUARE.replace("SE2 0 ", f"SE2 {X0} ")
-        .replace("SE2 1 ", f"SE2 {X0 + 1} ")
-        .replace(" 1 2 0 1.5 1", f" {X0 + 1} 2 0 1.5 1")
-    )
-    text = (
-        text.replace("VERTEX_SE2 2", f"VERTEX_SE2 {X0 + 2}").replace(" 2 2 0 1.5", f" {X0 + 2} 2 0 1.5")
-        + "VERTEX_SE2 5 0 0 0\n"
-    )
+    vertices = [f"VERTEX_SE2 {X0 + k} {k} 0 0" for k in range(3)]
+    edges = [f"EDGE_SE2 {X0 + k} {X0 + k + 1} 1 0 0 1 0 0 1 0 1" for k in range(2)]
+    text = "\n".join([*vertices, *edges, "VERTEX_SE2 5 0 0 0\n"])
     graph, notes = noted(filed(text), component="x1")
     assert graph.ids.tolist() == [X0, X0 + 1, X0 + 2]
     assert notes == "kept one of 2 components: 3 of 4 poses (x0 … x2)"
@@ -217,7 +211,7 @@ def test_components_and_messages_know_symbols(filed):
 
 
 def test_options_are_checked():
-    with pytest.raises(InvalidInputError, match='expected drop to be one of "priors", "gps", .* got \'prior\''):
+    with pytest.raises(InvalidInputError, match=r'expected drop to be one of "priors", "gps", .* got .prior.'):
         ReadingOptions(drop="prior")  # pyright: ignore[reportArgumentType]
     with pytest.raises(InvalidInputError, match="expected edge2_order to be one of"):
         ReadingOptions(edge2_order="g2o")  # pyright: ignore[reportArgumentType]

@@ -71,8 +71,8 @@ def read_g2o(path: StrPath, **options: Unpack[ReadingKeywords]) -> PoseGraph:
     ------
     FileError
         If the file cannot be read, a line is wrong, or it holds more than poses and plain edges and no option says what to do
-        about that: names the line, what was expected and what is there. Where the file has VERTEX lines, an id without one that a single edge names is refused (an edge to nowhere) unless that edge
-        links consecutive ids.
+        about that: names the line, what was expected and what is there. Where the file has VERTEX lines, an id without one
+        that a single edge names is refused (an edge to nowhere) unless that edge links consecutive ids.
     DisconnectedGraphError
         If poses without a VERTEX line are connected to none that has one; names some of them.
     """

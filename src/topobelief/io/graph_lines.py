@@ -19,7 +19,7 @@ from topobelief.graph.information import positive_definite
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.graph.projection import projected_to_plane
 from topobelief.graph.topology import Topology
-from topobelief.io.dialect import Dialect, Entries, Tag
+from topobelief.io.dialect import Dialect, Tag
 from topobelief.io.files import StrPath, read_text
 from topobelief.io.foreign_lines import ForeignLines
 from topobelief.io.reading import ReadGraph, ReadingOptions, by_option

@@ -3,8 +3,9 @@
     VERTEX2 id x y theta
     EDGE2 i j x y theta I11 I12 I22 I33 I13 I23
 
-Note the order of the information; iSAM writes EDGE2 with I11 I12 I13 I22 I23 I33, which is an option. TORO files in 3D (VERTEX3, EDGE3) are refused: programs disagree whether their information
-is per Euler angle or per rotation vector, and a guess would silently change every weight.
+Note the order of the information; iSAM writes EDGE2 with I11 I12 I13 I22 I23 I33, which is an option. TORO files in 3D
+(VERTEX3, EDGE3) are refused: programs disagree whether their information is per Euler angle or per rotation vector, and a guess
+would silently change every weight.
 """
 
 from __future__ import annotations
