@@ -11,7 +11,8 @@ from typing import get_args
 import pytest
 
 from topobelief.bounds.entropy_bounds import Determinant
-from topobelief.cli import app, main, plan, plan_stages
+from topobelief.cli import app, main, plan, plan_stages, reading
+from topobelief.io import reading as io_reading
 from topobelief.io import ros_map
 from topobelief.planning import evaluation, objectives, planner
 
@@ -60,10 +61,17 @@ def test_the_entry_point_exits_with_the_code(capsys):
         (plan.Determinant, Determinant),
         (plan.Proof, planner.Proof),
         (plan.Unknown, ros_map.Unknown),
+        (reading.Edge2Order, io_reading.Edge2Order),
     ],
 )
 def test_the_options_offer_exactly_the_choices_of_the_library(offered, known):
     assert set(get_args(offered)) == set(get_args(known))
+
+
+@pytest.mark.parametrize("command", ["plan", "info"])
+def test_help_names_all_that_can_be_dropped(topobelief, command):
+    told = topobelief([command, "--help"]).out
+    assert {word for word in get_args(io_reading.Droppable) if word not in told} == set()
 
 
 def test_a_terminal_without_greek_letters_is_no_bug(office):

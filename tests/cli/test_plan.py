@@ -228,3 +228,17 @@ def test_a_ranking_that_counts_poses_is_called_so():
 )
 def test_other_rankings_are_not(decision):
     assert plan_stages.length_bias_hint(decision) is None
+
+
+def test_the_graph_is_read_as_the_options_say(topobelief, office, tmp_path):
+    """A lone pose far away and a prior are left out, and told; the plan is that of the rest."""
+    graph_file = tmp_path / "parts.g2o"
+    graph_file.write_text(
+        office.graph_file.read_text() + "VERTEX_SE2 999 50 50 0\nEDGE_SE2_PRIOR 0 0 0 0 1 0 0 1 0 1\n", encoding="utf-8"
+    )
+    arguments = office.plan("--candidates", 2, "--component", "largest", "--drop", "priors", "--no-exact")
+    arguments[1] = str(graph_file)
+    told = topobelief(arguments).out.splitlines()
+    assert told[0].startswith(f"{graph_file}: dropped absolute priors on poses: EDGE_SE2_PRIOR on line ")
+    assert told[1] == f"{graph_file}: kept one of 2 components: 21 of 22 poses (0 … 20)"
+    assert told[2] == f"{graph_file}: 21 poses, 24 edges"

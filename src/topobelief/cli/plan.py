@@ -8,6 +8,8 @@ from typing import Annotated, Literal
 
 import typer
 
+from topobelief.cli.reading import Component, Drop, Edge2OrderOption, Planar, RobustAsPlain, reading_options
+
 # The planner's own choices, repeated so that help need not load it; a test holds them together.
 Objective = Literal["joint", "map", "per_pose"]
 Signature = Literal["spanning_trees", "von_neumann", "von_neumann_approx"]
@@ -51,7 +53,7 @@ def _detour(text: str) -> float:
 def plan(
     context: typer.Context,
     graph_file: Annotated[
-        Path, typer.Argument(metavar="GRAPH", help="Pose graph, .g2o or .toro; the robot stands at its last pose.")
+        Path, typer.Argument(metavar="GRAPH", help="Pose graph in g2o or TORO format; the robot stands at its last pose.")
     ],
     goal: Annotated[tuple[float, float], typer.Option(metavar="X Y", help="Where to go, metres.", callback=_finite)],
     map_file: Annotated[
@@ -210,6 +212,11 @@ def plan(
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the decision as JSON and nothing else.", rich_help_panel=_OUTPUT)
     ] = False,
+    drop: Drop = None,
+    robust_as_plain: RobustAsPlain = False,
+    edge2_order: Edge2OrderOption = "toro",
+    component: Component = "all",
+    planar: Planar = False,
 ) -> None:
     """Choose the best path to a goal on a pose-graph map.
 
@@ -238,7 +245,10 @@ def plan(
         line_of_sight=line_of_sight if line_of_sight is not None else not paper,
         information=plan_stages.information(sigma_p, sigma_theta),
     )
-    graph = plan_stages.read_graph(graph_file, reporter, optimized=optimize)
+    reading = reading_options(
+        drop, robust_as_plain=robust_as_plain, edge2_order=edge2_order, component=component, planar=planar
+    )
+    graph = plan_stages.read_graph(graph_file, reporter, optimized=optimize, reading=reading)
     world = plan_stages.read_world(map_file, graph, reporter, width=width, unknown=unknown)
     planner = Planner(
         graph,

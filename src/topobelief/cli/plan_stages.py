@@ -22,6 +22,7 @@ from topobelief.errors import FileError, InvalidInputError
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io import floor_plan
+from topobelief.io.reading import ReadingOptions
 from topobelief.io.ros_map import Unknown
 from topobelief.planning.decision import Decision
 from topobelief.planning.decision_quality import rank_correlation
@@ -77,7 +78,7 @@ def information(sigma_p: float | None, sigma_theta: float | None) -> FloatArray 
     return np.diag([sigma_p**-2, sigma_p**-2, sigma_theta**-2])
 
 
-def read_graph(path: Path, reporter: Reporter, *, optimized: bool) -> PoseGraph:
+def read_graph(path: Path, reporter: Reporter, *, optimized: bool, reading: ReadingOptions) -> PoseGraph:
     """The prior, in the plane.
 
     Raises
@@ -85,10 +86,11 @@ def read_graph(path: Path, reporter: Reporter, *, optimized: bool) -> PoseGraph:
     FileError
         For a graph in SE(3), besides all that `read_prior` refuses.
     """
-    prior = read_prior(path, reporter, optimized=optimized)
+    prior = read_prior(path, reporter, optimized=optimized, reading=reading)
     filed, graph = prior.filed, prior.graph
     if graph.group.position_dim != 2:
-        raise FileError(path, f"expected a graph in SE(2) to plan in the plane, got one in {graph.group.name}")
+        advice = "if it is planar but for its format, pass --planar"
+        raise FileError(path, f"expected a graph in SE(2) to plan in the plane, got one in {graph.group.name}; {advice}")
     reporter.say(f"{path}: {graph.num_poses} poses, {graph.num_edges} edges")
     if optimized:
         reporter.say(f"χ² per degree of freedom: {chi2_per_dof(filed)} as filed, {chi2_per_dof(graph)} optimised")

@@ -197,7 +197,7 @@ class _Reader:
         if wrong.size:
             row, column = (int(index) for index in wrong[0])
             text = self._fields(table.lines[row])[1 + table.meaning.num_ids + column]
-            raise FileError(self.path, f"expected finite numbers for {table.tag}, got {text}", line=table.lines[row])
+            raise FileError(self.path, f"expected finite numbers for {table.tag}, got {text[:40]}", line=table.lines[row])
         if self.group.rotation_dim > 1:
             with np.errstate(over="ignore"):
                 norms = np.linalg.norm(values[:, self.group.position_dim : self.group.pose_size], axis=1)
