@@ -73,6 +73,16 @@ def test_ids_may_be_unordered_and_leave_gaps(filed):
     assert graph.edges.tolist() == [[2, 0], [0, 1]]
 
 
+def test_ids_use_all_of_63_bits_however_they_are_written(filed):
+    """No id is rounded on its way, and the last one that fits is read."""
+    last = 2**63 - 1
+    edges = f"EDGE_SE2 1e3 {last} 1 0 0 {UNIT_2D}\nEDGE_SE2 {last - 1} {last} 1 0 0 {UNIT_2D}\n"
+    graph = read_g2o(filed(f"VERTEX_SE2 1000.0 0 0 0\nVERTEX_SE2 {last} 0 0 0\nFIX {last}\n" + edges))
+    assert graph.ids.tolist() == [1000, last - 1, last]
+    assert graph.edges.tolist() == [[0, 2], [1, 2]]
+    assert graph.fixed == (2,)
+
+
 def test_comments_blank_lines_and_line_ends_are_layout(filed):
     """Comments (whole lines and ends of lines), blank lines, tabs, and the line ends of other systems change nothing."""
     plain = read_g2o(filed(TRIANGLE))

@@ -57,7 +57,7 @@ def checked_information(information: ArrayLike, *, num_edges: int, tangent_dim: 
 
 def positive_definite(information: FloatArray) -> BoolArray:
     """Which of some finite symmetric matrices are positive definite to rounding, whatever the units; shape (num_edges,)."""
-    definite = (np.diagonal(information, axis1=1, axis2=2) > 0).all(axis=1)
+    definite: BoolArray = np.asarray((np.diagonal(information, axis1=1, axis2=2) > 0).all(axis=1))
     smallest = np.linalg.eigvalsh(_scaled(information[definite]))[:, 0]
     definite[definite] = smallest > np.finfo(float).eps * information.shape[1]
     return definite

@@ -131,12 +131,13 @@ class _Reader:
         tables = {tag: _Table(tag, meaning) for tag, meaning in self.dialect.tags.items()}
         for number, line in enumerate(self.text_lines, start=1):
             fields = self._fields(number)
-            if not fields or fields[0].startswith("PARAMS_") or (self.rewritten and fields[0] in SWITCHES):
+            if not fields:
                 continue
             tag = fields.pop(0)
             table = tables.get(tag)
             if table is None and tag != "FIX":
-                if not self.foreign.take(tag, number, fields):
+                skipped = tag.startswith("PARAMS_") or (self.rewritten and tag in SWITCHES)
+                if not skipped and not self.foreign.take(tag, number, fields):
                     raise FileError(self.path, self._refusal(tag), line=number)
                 continue
             if table is not None and len(fields) != table.meaning.num_fields:
@@ -144,14 +145,15 @@ class _Reader:
             num_ids = table.meaning.num_ids if table is not None else len(fields)
             try:
                 numbers = [float(text) for text in fields[num_ids:]]
-                ids = [_whole(text) for text in fields[:num_ids]]
+                ids = _whole_numbers(fields[:num_ids])
                 plain = line.isascii() and line.count("_") == tag.count("_")  # float takes other digits, and 1_000
             except ValueError:
                 ids, numbers, plain = [], [], False
             if not plain and (wrong := next((text for text in fields if not _is_number(text)), None)) is not None:
                 raise FileError(self.path, f"expected a number for {tag}, got {wrong[:40]!r}", line=number)
-            if (wrong_id := next((k for k, value in enumerate(ids) if not 0 <= value < _ID_LIMIT), None)) is not None:
-                message = f"expected whole ids from 0 to 2^63 - 1 for {tag}, got {fields[wrong_id][:40]}; renumber the poses"
+            if ids and (min(ids) < 0 or max(ids) >= _ID_LIMIT):
+                wrong = next(text for text, value in zip(fields, ids, strict=False) if not 0 <= value < _ID_LIMIT)
+                message = f"expected whole ids from 0 to 2^63 - 1 for {tag}, got {wrong[:40]}; renumber the poses"
                 raise FileError(self.path, message, line=number)
             if table is not None:
                 table.lines.append(number)
@@ -334,8 +336,16 @@ def _wrong_count(table: _Table, got: int) -> str:
     return f"expected {ids}, {meaning.group.pose_size} numbers{more} for {table.tag}, got {got} fields"
 
 
-def _whole(text: str) -> int:
-    """The whole number that a text is, -1 where it is another number."""
+def _whole_numbers(texts: list[str]) -> list[int]:
+    """The whole numbers that texts are; -1 in place of other numbers."""
+    try:
+        return [int(text) for text in texts]
+    except ValueError:
+        return [_whole_number(text) for text in texts]
+
+
+def _whole_number(text: str) -> int:
+    """As `_whole_numbers`, for one that may be written as 1e3 or 5.0."""
     try:
         return int(text)
     except ValueError:
