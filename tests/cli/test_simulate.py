@@ -125,6 +125,23 @@ def test_bad_input_is_one_line(topobelief, tmp_path, arguments, message):
     assert not list(tmp_path.iterdir())
 
 
+def test_paths_narrower_than_the_chassis_are_refused_before_anything_moves(topobelief, room, tmp_path):
+    room.write_text(ROOM + "robot_radius: 0.15\n")
+    outcome = topobelief(["simulate", str(room), "--out", "run"])
+    assert outcome.code == 2
+    assert "room.yaml:5: robot_radius: expected at least the radius of the chassis, 0.25 m, got 0.15" in outcome.err
+    assert outcome.err.count("\n") == 1
+    assert not (tmp_path / "run").exists()
+
+
+def test_paths_close_by_walls_are_warned_of(topobelief, room):
+    room.write_text(ROOM.replace("[6.5, 1.5], ", "") + "robot_radius: 0.3\n")
+    outcome = topobelief(["simulate", str(room), "--no-pictures", "--out", "run"])
+    assert outcome.code == 0
+    assert outcome.err.startswith("topobelief: robot_radius 0.3 m leaves 0.05 m beside the chassis of 0.25 m")
+    assert outcome.err.count("\n") == 1
+
+
 def test_another_run_is_not_continued(topobelief, room):
     arguments = ["simulate", str(room), "--no-pictures", "--out", "run"]
     assert topobelief(arguments).code == 0

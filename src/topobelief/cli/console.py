@@ -44,6 +44,10 @@ class Reporter:
         self.notes.append(text)
         self.say(text)
 
+    def warn(self, text: str) -> None:
+        """Print a line on stderr, whoever listens."""
+        print(f"topobelief: {text}", file=sys.stderr)
+
     def answer(self, document: Mapping[str, object]) -> None:
         """Print for a program."""
         if self.as_json:

@@ -74,6 +74,8 @@ def simulate(
         if displaced and not resume:
             raise InvalidInputError("expected --displaced together with --resume, got it alone")
         place = with_detour(scenario_of(scenario), max_detour)
+        if place.caution:
+            reporter.warn(place.caution)
         options = RunOptions(
             strategy=checked_strategy(strategy),
             objective=objective,
@@ -144,6 +146,7 @@ def simulate_compare(
         from topobelief.cli import comparison_files
         from topobelief.cli.plan_files import checked_folder
         from topobelief.errors import InvalidInputError
+        from topobelief.experiments.scenario_file import scenario_of
         from topobelief.experiments.strategy_comparison import ComparisonTask
         from topobelief.report.simulation_tables import comparison_table
         from topobelief.simulation.comparison import summarised
@@ -157,6 +160,9 @@ def simulate_compare(
             raise InvalidInputError("expected injected noise to redraw, got physical noise, of which there is one draw a run")
         folder = out or Path("out") / f"compare-{Path(scenario).stem}"
         checked_folder(folder)
+        caution = scenario_of(scenario).caution
+        if caution:
+            reporter.warn(caution)
         task = ComparisonTask(
             scenario=scenario,
             max_detour=max_detour,

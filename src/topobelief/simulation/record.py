@@ -19,7 +19,9 @@ from topobelief.simulation.scan import Scan
 from topobelief.simulation.scenario import Scenario
 from topobelief.simulation.strategies import Choice
 
-ARRIVED, INTERRUPTED = "arrived", "interrupted"
+ARRIVED, MISSED, CONTACT, INTERRUPTED = "arrived", "missed", "contact", "interrupted"
+ARRIVAL_TOLERANCE = 0.3
+"""Distance from its goal, metres, within which a robot that believes to have arrived truly has."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,7 +58,8 @@ class Leg:
     first_pose, last_pose
         Key poses at its begin and end.
     outcome
-        "arrived", "interrupted", or why it ended, in words.
+        "arrived", "interrupted", or why it ended, in words: "missed: ..." where the robot believed itself at the goal and was
+        not, "contact: ..." where its chassis touched a wall, "stuck: ...", "blocked: ...", "unreachable: ...".
     num_candidates, chosen
         The latter counts from 0.
     planned, distance
@@ -70,7 +73,10 @@ class Leg:
     driven_seconds
         Simulated time.
     contacts
-        Control periods in which the chassis touched a wall.
+        Physics steps (of 5 ms) in which the chassis touched a wall.
+    goal_distance, believed_goal_distance
+        From the goal at the end of the leg, of the robot's true position and of where it believed itself to be, metres; nan
+        where nothing was driven.
     """
 
     goal: int
@@ -89,11 +95,18 @@ class Leg:
     decision_seconds: float = 0.0
     driven_seconds: float = 0.0
     contacts: int = 0
+    goal_distance: float = float("nan")
+    believed_goal_distance: float = float("nan")
 
     @property
     def arrived(self) -> bool:
-        """Whether its goal was reached, by the robot's own estimate."""
+        """Whether its goal was reached: by the robot's own estimate, and in truth within `ARRIVAL_TOLERANCE`."""
         return self.outcome == ARRIVED
+
+    @property
+    def believed_arrived(self) -> bool:
+        """Whether its goal was reached by the robot's own estimate, which is all that the robot knows."""
+        return self.arrived or self.outcome.startswith(MISSED)
 
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
@@ -136,6 +149,8 @@ class KeyPoses:
         Seconds.
     truth, wheel_odometry : shape (n, 3)
         In the world; the latter from the known start on.
+    motions : shape (n, 3)
+        Since the key pose before, as the front end had tracked it when the key pose was made.
     scans
         n of them.
     """
@@ -143,6 +158,7 @@ class KeyPoses:
     times: FloatArray
     truth: FloatArray
     wheel_odometry: FloatArray
+    motions: FloatArray
     scans: tuple[Scan, ...]
 
     def __len__(self) -> int:
@@ -154,6 +170,7 @@ class KeyPoses:
             times=self.times[:count],
             truth=self.truth[:count],
             wheel_odometry=self.wheel_odometry[:count],
+            motions=self.motions[:count],
             scans=self.scans[:count],
         )
 
@@ -211,7 +228,7 @@ class Record:
     deliberations
         Of this run.
     outcome
-        "arrived" where all goals were reached, else what the last leg says.
+        "arrived" where all goals that it set out for were reached, else what the last leg to the last of the others says.
     """
 
     scenario: Scenario
@@ -236,5 +253,5 @@ class Record:
 
     @property
     def num_goals_reached(self) -> int:
-        """How many goals were reached."""
+        """How many goals were reached in truth."""
         return sum(leg.arrived for leg in self.legs if leg.goal > 0)
