@@ -8,11 +8,14 @@ from .candidates.roadmap import Roadmap as Roadmap
 from .candidates.roadmap import build_roadmap as build_roadmap
 from .entropy import joint_entropy as joint_entropy
 from .entropy import joint_entropy_estimate as joint_entropy_estimate
+from .errors import ReadingWarning as ReadingWarning
 from .errors import TopobeliefError as TopobeliefError
 from .estimation import optimize as optimize
 from .graph.action import Action as Action
 from .graph.action import posterior as posterior
+from .graph.components import components as components
 from .graph.pose_graph import PoseGraph as PoseGraph
+from .graph.projection import projected_to_plane as projected_to_plane
 from .graph.topology import Topology as Topology
 from .io.floor_plan import read_walls as read_walls
 from .io.floor_plan import read_world as read_world
@@ -21,6 +24,7 @@ from .io.g2o import read_g2o as read_g2o
 from .io.g2o import write_g2o as write_g2o
 from .io.gtsam import from_gtsam as from_gtsam
 from .io.gtsam import to_gtsam as to_gtsam
+from .io.reading import ReadingOptions as ReadingOptions
 from .io.ros_map import read_ros_map as read_ros_map
 from .io.ros_map import write_ros_map as write_ros_map
 from .io.toro import read_toro as read_toro

@@ -72,5 +72,7 @@ def frozen_ints(values: ArrayLike, *, name: str) -> IntArray:
         raw = raw.astype(np.int64)
     if raw.dtype.kind not in "iu":
         raise InvalidInputError(f"expected {name} to be integers, got dtype {raw.dtype}")
+    if raw.dtype == np.uint64 and raw.max() >= 2**63:
+        raise InvalidInputError(f"expected {name} below 2^63, got {raw.max()}")
     array = np.array(raw, dtype=np.int64, order="C")
     return read_only(array)

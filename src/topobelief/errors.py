@@ -10,9 +10,15 @@ import math
 from collections.abc import Collection, Sequence
 from os import PathLike, fspath
 
+from topobelief.symbols import node_name
+
 
 class TopobeliefError(Exception):
     """Root of all errors raised on purpose; its message is one line."""
+
+
+class ReadingWarning(UserWarning):
+    """A graph is not quite what its file says, because an option of reading dropped or assumed something; says what."""
 
 
 class InvalidInputError(TopobeliefError, ValueError):
@@ -51,10 +57,10 @@ class DisconnectedGraphError(InvalidGraphError):
 
     def __init__(self, nodes: Sequence[int], *, anchor: int, what: str = "graph") -> None:
         self.nodes = tuple(int(node) for node in nodes)
-        shown = ", ".join(str(node) for node in self.nodes[:5])
+        shown = ", ".join(map(node_name, self.nodes[:5]))
         more = f" and {len(self.nodes) - 5} more" if len(self.nodes) > 5 else ""
         super().__init__(
-            f"expected a connected {what}, got {len(self.nodes)} node(s) that node {anchor} does not reach: "
+            f"expected a connected {what}, got {len(self.nodes)} node(s) that node {node_name(anchor)} does not reach: "
             f"{shown}{more}; add the missing edges or keep one component"
         )
 

@@ -12,7 +12,8 @@ from typing import get_args
 import pytest
 
 from topobelief.bounds.entropy_bounds import Determinant
-from topobelief.cli import app, main, plan, plan_stages
+from topobelief.cli import app, main, plan, plan_stages, reading
+from topobelief.io import reading as io_reading
 from topobelief.io import ros_map
 from topobelief.planning import planner
 from topobelief.planning.registry import AUTO, BOUNDS, OBJECTIVES, SIGNATURES
@@ -83,10 +84,17 @@ def test_the_entry_point_exits_with_the_code(capsys):
         (plan.Determinant, get_args(Determinant)),
         (plan.Proof, get_args(planner.Proof)),
         (plan.Unknown, get_args(ros_map.Unknown)),
+        (reading.Edge2Order, get_args(io_reading.Edge2Order)),
     ],
 )
 def test_the_options_offer_exactly_the_choices_of_the_library(offered, known):
     assert set(get_args(offered)) == set(known)
+
+
+@pytest.mark.parametrize("command", ["plan", "info"])
+def test_help_names_all_that_can_be_dropped(topobelief, command):
+    told = topobelief([command, "--help"]).out
+    assert {word for word in get_args(io_reading.Droppable) if word not in told} == set()
 
 
 def test_a_terminal_without_greek_letters_is_no_bug(office):

@@ -192,3 +192,11 @@ def test_actions_copy_their_arrays():
     assert (action.poses.tolist(), action.edges.tolist()) == ([[3, 0, 0]], [[2, 3]])
     with pytest.raises(AttributeError):
         action.cost = 3.0
+
+
+def test_new_poses_get_ids_after_the_largest_or_where_there_is_room():
+    """Ids end at 2^63 - 1; from there on new poses take the smallest ones that are free."""
+    for ids, expected in (([5, 7], [8, 9]), ([1, 2**63 - 4], [2**63 - 3, 2**63 - 2]), ([1, 2**63 - 1], [0, 2])):
+        graph = PoseGraph([[0, 0, 0], [1, 0, 0]], [(0, 1)], None, np.eye(3), ids=ids)
+        action = Action([[2, 0, 0], [3, 0, 0]], [(1, 2), (2, 3)], np.eye(3))
+        assert posterior(graph, action).ids.tolist() == [*ids, *expected]

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 
 from graphs import pose_graphs
-from topobelief.errors import DisconnectedGraphError, InvalidGraphError, TopobeliefError
+from topobelief.errors import DisconnectedGraphError, InvalidGraphError, InvalidInputError, TopobeliefError
 from topobelief.graph.pose_graph import PoseGraph
 
 EYE = np.eye(3)
@@ -140,6 +140,12 @@ def test_what_is_not_numbers_is_refused(poses):
 def test_ids_are_one_each(ids, message):
     with pytest.raises(InvalidGraphError, match=message):
         PoseGraph(LINE, CHAIN, None, EYE, ids=ids)
+
+
+def test_ids_beyond_64_bits_are_refused_not_wrapped():
+    assert PoseGraph(LINE, CHAIN, None, EYE, ids=[0, 1, 2**63 - 1]).ids.tolist() == [0, 1, 2**63 - 1]
+    with pytest.raises(InvalidInputError, match=r"expected ids below 2\^63, got 9223372036854775808"):
+        PoseGraph(LINE, CHAIN, None, EYE, ids=np.array([0, 1, 2**63], dtype=np.uint64))
 
 
 def test_fixed_poses_exist():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Annotated, Literal
 import typer
 
 from topobelief.cli.choices import completed, one_of
+from topobelief.cli.reading import Component, Drop, Edge2OrderOption, Planar, RobustAsPlain, reading_options
 from topobelief.errors import NotOptimizedWarning, degrees_hint
 from topobelief.planning.registry import AUTO, BOUNDS, OBJECTIVES, SIGNATURES
 
@@ -32,9 +34,9 @@ _UNIFORM_STD = math.pi / math.sqrt(3)  # radians, of a heading of which nothing 
 
 @dataclass(frozen=True, slots=True)
 class GivenStart:
-    """Where the robot stands, as given: the id of a pose, or a place."""
+    """Where the robot stands, as given: the id of a pose (12, or a symbol such as x3), or a place."""
 
-    pose_id: int | None = None
+    pose_id: str | None = None
     place: tuple[float, float] | None = None
 
     def __str__(self) -> str:
@@ -45,7 +47,9 @@ def _start(text: str) -> GivenStart:
     words = text.split()
     try:
         if len(words) == 1:
-            return GivenStart(pose_id=int(words[0]))
+            if not re.fullmatch(r"-?\d+|[A-Za-z]{1,2}\d+", words[0]):
+                raise ValueError
+            return GivenStart(pose_id=words[0])
         x, y = map(float, words)
         if math.isfinite(x) and math.isfinite(y):
             return GivenStart(place=(x, y))
@@ -96,7 +100,7 @@ def _detour(text: str) -> float:
 
 def plan(
     context: typer.Context,
-    graph_file: Annotated[Path, typer.Argument(metavar="GRAPH", help="Pose graph, .g2o or .toro.")],
+    graph_file: Annotated[Path, typer.Argument(metavar="GRAPH", help="Pose graph in g2o or TORO format.")],
     goal: Annotated[tuple[float, float], typer.Option(metavar="X Y", help="Where to go, metres.", callback=_finite)],
     start: Annotated[
         GivenStart | None,
@@ -325,6 +329,11 @@ def plan(
         bool,
         typer.Option("--json", metavar="", help="Print the decision as JSON and nothing else.", rich_help_panel=_OUTPUT),
     ] = False,
+    drop: Drop = None,
+    robust_as_plain: RobustAsPlain = False,
+    edge2_order: Edge2OrderOption = "toro",
+    component: Component = "all",
+    planar: Planar = False,
 ) -> None:
     """Choose the best path to a goal on a pose-graph map.
 
@@ -353,7 +362,10 @@ def plan(
         line_of_sight=line_of_sight if line_of_sight is not None else not paper,
         information=plan_stages.information(sigma_p, sigma_theta),
     )
-    graph = plan_stages.read_graph(graph_file, reporter, optimized=optimize)
+    reading = reading_options(
+        drop, robust_as_plain=robust_as_plain, edge2_order=edge2_order, component=component, planar=planar
+    )
+    graph = plan_stages.read_graph(graph_file, reporter, optimized=optimize, reading=reading)
     world = plan_stages.read_world(map_file, graph, reporter, width=width, unknown=unknown)
     begin = plan_stages.choose_start(
         graph, world, reporter, pose_id=start.pose_id if start else None, place=start.place if start else None

@@ -24,11 +24,13 @@ from topobelief.graph.action import Action
 from topobelief.graph.fit import misfit
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io import floor_plan
+from topobelief.io.reading import ReadingOptions
 from topobelief.io.ros_map import Unknown
 from topobelief.planning.decision import Decision
 from topobelief.planning.decision_quality import rank_correlation
 from topobelief.planning.planner import Planner
 from topobelief.report.tables import candidate_table
+from topobelief.symbols import find_node, node_name
 from topobelief.world import World
 from topobelief.world.trajectory import default_width
 
@@ -80,7 +82,7 @@ def information(sigma_p: float | None, sigma_theta: float | None) -> FloatArray 
     return np.diag([sigma_p**-2, sigma_p**-2, sigma_theta**-2])
 
 
-def read_graph(path: Path, reporter: Reporter, *, optimized: bool) -> PoseGraph:
+def read_graph(path: Path, reporter: Reporter, *, optimized: bool, reading: ReadingOptions) -> PoseGraph:
     """The prior, in the plane.
 
     Raises
@@ -88,10 +90,11 @@ def read_graph(path: Path, reporter: Reporter, *, optimized: bool) -> PoseGraph:
     FileError
         For a graph in SE(3), besides all that `read_prior` refuses.
     """
-    prior = read_prior(path, reporter, optimized=optimized)
+    prior = read_prior(path, reporter, optimized=optimized, reading=reading)
     filed, graph = prior.filed, prior.graph
     if graph.group.position_dim != 2:
-        raise FileError(path, f"expected a graph in SE(2) to plan in the plane, got one in {graph.group.name}")
+        advice = "if it is planar but for its format, pass --planar"
+        raise FileError(path, f"expected a graph in SE(2) to plan in the plane, got one in {graph.group.name}; {advice}")
     reporter.say(f"{path}: {graph.num_poses} poses, {graph.num_edges} edges")
     if optimized:
         reporter.say(f"χ² per degree of freedom: {chi2_per_dof(filed)} as filed, {chi2_per_dof(graph)} optimised")
@@ -134,7 +137,7 @@ def choose_start(
     world: World,
     reporter: Reporter,
     *,
-    pose_id: int | None = None,
+    pose_id: str | None = None,
     place: tuple[float, float] | None = None,
 ) -> Start:
     """The pose with an id, a place, or the last pose; told, and whether the robot may be elsewhere.
@@ -147,26 +150,27 @@ def choose_start(
         Where no pose is in sight of the place.
     """
     last = graph.num_poses - 1
+    ids: list[int] = graph.ids.tolist()
     if place is not None:
         start = find_start(graph, place, world=world)
-        nearest = f"{start.distance(graph):.2f} m from pose {graph.ids[start.pose]}, the nearest in sight"
+        nearest = f"{start.distance(graph):.2f} m from pose {node_name(ids[start.pose])}, the nearest in sight"
         reporter.say(f"from {_shown(start.place)}, {nearest}")
         return start
     if pose_id is not None:
-        matches = np.flatnonzero(graph.ids == pose_id)
-        if not matches.size:
-            ids = f"from {graph.ids.min()} to {graph.ids.max()}"
-            raise InvalidInputError(f"expected --start as the id of a pose of the file ({ids}) or as X Y, got {pose_id}")
-        start = find_start(graph, int(matches[0]))
+        index = find_node(ids, pose_id)
+        if index is None:
+            known = f"from {node_name(min(ids))} to {node_name(max(ids))}"
+            raise InvalidInputError(f"expected --start as the id of a pose of the file ({known}) or as X Y, got {pose_id}")
+        start = find_start(graph, index)
         reporter.say(f"from pose {pose_id} at {_shown(start.place)}")
         return start
     start = find_start(graph, last)
-    reporter.say(f"from pose {graph.ids[last]}, the last of the file, at {_shown(start.place)}")
+    reporter.say(f"from pose {node_name(ids[last])}, the last of the file, at {_shown(start.place)}")
     end = graph.odometry_end
     if end is not None and end != last:
         reporter.note(
-            f"the odometry from the first pose on ends at pose {graph.ids[end]}, not at pose {graph.ids[last]}; "
-            f"if the robot stands there, pass --start {graph.ids[end]}"
+            f"the odometry from the first pose on ends at pose {node_name(ids[end])}, not at pose {node_name(ids[last])}; "
+            f"if the robot stands there, pass --start {node_name(ids[end])}"
         )
     return start
 

@@ -242,7 +242,7 @@ def posterior(graph: PoseGraph, action: Action) -> PoseGraph:
     poses = np.concatenate([graph.poses, action.poses]) if action.num_new_poses else graph.poses
     i, j = action.edges.T
     predicted = graph.group.between(poses[i], poses[j])
-    new_ids = int(graph.ids.max()) + 1 + np.arange(action.num_new_poses)
+    new_ids = _new_ids(graph.ids, action.num_new_poses)
     return PoseGraph._from_checked(  # pyright: ignore[reportPrivateUsage]  (the two modules are one room)
         Topology(len(poses), np.concatenate([graph.edges, action.edges])),
         poses,
@@ -251,3 +251,11 @@ def posterior(graph: PoseGraph, action: Action) -> PoseGraph:
         np.concatenate([graph.ids, new_ids]),
         graph.fixed,
     )
+
+
+def _new_ids(ids: IntArray, count: int) -> IntArray:
+    """Ids of new poses: those after the largest or, where there is no room, the smallest that are free."""
+    largest = int(ids.max())
+    if largest < 2**63 - 1 - count:
+        return largest + 1 + np.arange(count)
+    return np.setdiff1d(np.arange(len(ids) + count), ids)[:count]

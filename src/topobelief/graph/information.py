@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from topobelief.arrays import FloatArray, frozen_floats, read_only
+from topobelief.arrays import BoolArray, FloatArray, frozen_floats, read_only
 from topobelief.errors import InvalidGraphError
 
 _SPLITS = {3: (2, 1), 6: (3, 3)}
@@ -55,6 +55,20 @@ def checked_information(information: ArrayLike, *, num_edges: int, tangent_dim: 
     return _symmetric(array)
 
 
+def positive_definite(information: FloatArray) -> BoolArray:
+    """Which of some finite symmetric matrices are positive definite to rounding, whatever the units; shape (num_edges,)."""
+    definite: BoolArray = np.asarray((np.diagonal(information, axis1=1, axis2=2) > 0).all(axis=1))
+    smallest = np.linalg.eigvalsh(_scaled(information[definite]))[:, 0]
+    definite[definite] = smallest > np.finfo(float).eps * information.shape[1]
+    return definite
+
+
+def _scaled(information: FloatArray) -> FloatArray:
+    """Matrices of positive diagonals brought to diagonals of ones."""
+    scale = 1 / np.sqrt(np.diagonal(information, axis1=1, axis2=2))
+    return information * scale[:, :, None] * scale[:, None, :]
+
+
 def _symmetric(matrices: FloatArray) -> FloatArray:
     """The mean of each matrix and its transpose, where they differ in the last digits."""
     transposed = np.swapaxes(matrices, -1, -2)
@@ -67,17 +81,14 @@ def _require_positive_definite(information: FloatArray) -> None:
     not_finite = np.flatnonzero(~np.isfinite(information).all(axis=(1, 2)))
     if not_finite.size:
         raise InvalidGraphError(f"expected a finite information matrix, got nan or inf at edge {not_finite[0]}")
-    diagonal = np.diagonal(information, axis1=1, axis2=2)
-    flat = np.flatnonzero(~(diagonal > 0).all(axis=1))
-    if flat.size == 0:
-        scale = 1 / np.sqrt(diagonal)
-        scaled = information * scale[:, :, None] * scale[:, None, :]
+    if (np.diagonal(information, axis1=1, axis2=2) > 0).all():
+        scaled = _scaled(information)
         asymmetric = np.flatnonzero(
             np.abs(scaled - scaled.transpose(0, 2, 1)).max(axis=(1, 2), initial=0.0) > _SYMMETRY_TOLERANCE
         )
         if asymmetric.size:
             raise InvalidGraphError(f"expected a symmetric information matrix, got an asymmetric one at edge {asymmetric[0]}")
-        flat = np.flatnonzero(np.linalg.eigvalsh(scaled)[:, 0] <= np.finfo(float).eps * information.shape[1])
+    flat = np.flatnonzero(~positive_definite(information))
     if flat.size:
         raise InvalidGraphError(
             f"expected a positive definite information matrix, got an indefinite or singular one at edge {flat[0]}"
