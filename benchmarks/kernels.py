@@ -10,14 +10,14 @@ import pytest
 
 from topobelief.experiments.benchmark.certificates import block_isotropic
 from topobelief.experiments.benchmark.sessions import candidate_paths, city_drive
+from topobelief.forms.action_batch import ActionBatch
+from topobelief.forms.degree_sums import DegreeSums
 from topobelief.graph.action import check_actions
 from topobelief.graph.fisher import fisher_rows
 from topobelief.linalg.edge_form import laplacian_form
 from topobelief.linalg.elimination_paths import FormFactor
 from topobelief.linalg.elimination_tree import EliminationTree
 from topobelief.linalg.increments import log_det_increments
-from topobelief.planning.action_batch import ActionBatch
-from topobelief.signatures.degree_increments import DegreeEntropy
 
 HELD = 9_999
 RNG = np.random.default_rng(0)
@@ -63,8 +63,8 @@ def test_increments_of_1000_actions_with_their_paths(benchmark, tree, name):
 
 
 def test_degrees_of_1000_actions(benchmark):
-    batch, entropy = ActionBatch(GRAPH, ACTIONS), DegreeEntropy(GRAPH.topology)
-    benchmark(entropy.of_extensions, batch.edges, batch.edge_start, batch.num_new)
+    batch, sums = ActionBatch(GRAPH, ACTIONS), DegreeSums(GRAPH.topology)
+    benchmark(sums.of_extensions, batch.edges, batch.edge_start, batch.num_new)
 
 
 def test_whitened_rows_of_1000_actions(benchmark):

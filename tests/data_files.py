@@ -20,7 +20,12 @@ def map_file(name: str) -> Path:
     return _file_or_skip(Path(os.environ.get("TOPOBELIEF_MAPS", _BESIDE_CHECKOUT / "maps")) / name)
 
 
+def case_file(name: str) -> Path:
+    """An input from $TOPOBELIEF_CASES, or from shared/cases beside the checkout; skips where it is absent."""
+    return _file_or_skip(Path(os.environ.get("TOPOBELIEF_CASES", _BESIDE_CHECKOUT / "cases")) / name)
+
+
 def _file_or_skip(path: Path) -> Path:
     if not path.exists():
-        pytest.skip(f"{path.name} is not at hand: set TOPOBELIEF_DATA or TOPOBELIEF_MAPS to its folder")
+        pytest.skip(f"{path.name} is not at hand: set TOPOBELIEF_DATA, TOPOBELIEF_MAPS or TOPOBELIEF_CASES to its folder")
     return path

@@ -64,7 +64,7 @@ def driven(
     """Key poses along a path, by the front end's own rule."""
     rng = np.random.default_rng(seed)
     eyes = Lidar(world, lidar or LidarSettings())
-    gate = FrontEnd(start=np.zeros(3)) if front_end is None else front_end
+    gate = FrontEnd() if front_end is None else front_end
     nothing = Scan(np.zeros(0), np.zeros(0), 0.0, 10.0)
     key_poses: list[KeyPose] = []
     before, wheel = None, SE2_GROUP.identity()

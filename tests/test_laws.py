@@ -217,6 +217,33 @@ def test_the_map_never_gets_worse_by_looking(session, seed):
         assert planner.entropies([more])[0] <= after + 1e-9 * (1 + abs(after)) + 10 * before.error
 
 
+@given(pose_graphs(min_poses=2, log_ratio=(-2.0, 1.0)), seeds)
+def test_parts_that_touch_the_map_at_one_pose_each_bring_it_nothing(graph, seed):
+    """Whatever closures they have within: they follow the pose that they touch. The signature says so too."""
+    rng = np.random.default_rng(seed)
+    n = graph.num_poses
+    touched = rng.integers(n, size=2)
+    rings = [[(t, a), (a, a + 1), (a + 2, a + 1), (a + 2, t)] for t, a in zip(touched, (n, n + 3), strict=True)]
+    poses = graph.poses[np.repeat(touched, 3)]
+    poses[:, : graph.group.position_dim] += np.ptp(graph.positions) * rng.normal(size=(6, graph.group.position_dim))
+    action = tb.Action(poses, np.concatenate(rings), graph.information[rng.integers(graph.num_edges, size=8)])
+    stay = tb.Action(poses[:0], np.empty((0, 2), dtype=int), graph.information[0])
+    decision = tb.Planner(graph, objective="map").decide([stay, action])
+    values = tb.Planner(graph, objective="map").entropies([stay, action])
+    assert values[1] == close(values[0])
+    assert decision.signatures[1] == close(decision.signatures[0])
+
+
+def test_the_signature_of_the_map_is_no_bound_of_its_entropy():
+    """Three poses on a line: det I / det I_nn = 45/16 is less than the trees' (3/2)^3, so J_map lies above c - s_map."""
+    line = tb.PoseGraph([[0, 0, 0], [1, 0, 0]], [(0, 1)], None, np.eye(3))
+    loop = tb.Action([[2, 0, 0]], [(1, 2), (2, 0)], np.eye(3))
+    planner = tb.Planner(line, objective="map")
+    c, (entropy,) = 1.5 * LOG_2_PI_E, planner.entropies([loop])
+    assert entropy == close(c - math.log(45 / 16) / 2)
+    assert c - planner.decide([loop]).signatures[0] == close(c - math.log(27 / 8) / 2)
+
+
 @given(sessions(min_actions=2))
 def test_sequential_actions_are_one_action(session):
     """The posterior of a posterior is the posterior of both at once: same entropy, bounds and signature."""

@@ -9,23 +9,11 @@ information is held whichever is asked for (on a real graph with one information
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-
-from topobelief.graph.fisher import fisher_rows
+from topobelief.forms.of_graph import GraphForms
+from topobelief.graph.fit import warn_of_misfit
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.graph.topology import checked_anchor
-from topobelief.linalg import LogDet, LogDetSolver
-
-LOG_2_PI_E = math.log(2 * math.pi * math.e)
-
-
-@dataclass(frozen=True, slots=True)
-class EntropyEstimate:
-    """A joint entropy and an estimate of its absolute rounding error, nats."""
-
-    value: float
-    error: float
+from topobelief.linalg.estimate import LOG_2_PI_E, Estimate, Number
 
 
 def joint_entropy(graph: PoseGraph, *, anchor: int = 0) -> float:
@@ -52,6 +40,11 @@ def joint_entropy(graph: PoseGraph, *, anchor: int = 0) -> float:
     IllConditionedError
         If double precision cannot give J to 0.1 nats.
 
+    Warns
+    -----
+    NotOptimizedWarning
+        Where the poses are far from the estimate (chi^2 per degree of freedom above 100).
+
     Examples
     --------
     >>> import numpy as np
@@ -60,19 +53,21 @@ def joint_entropy(graph: PoseGraph, *, anchor: int = 0) -> float:
     >>> round(joint_entropy(chain), 6)  # a tree: 3 ln(2 pi e) - ln|Omega|
     -6.688174
     """
-    return joint_entropy_estimate(graph, anchor=anchor).value
+    entropy = joint_entropy_estimate(graph, anchor=anchor).value
+    warn_of_misfit(graph)
+    return entropy
 
 
-def joint_entropy_estimate(graph: PoseGraph, *, anchor: int = 0) -> EntropyEstimate:
+def joint_entropy_estimate(graph: PoseGraph, *, anchor: int = 0) -> Estimate[float]:
     """`joint_entropy` together with the estimate of its rounding error (docs, the mathematics, section 10)."""
     graph.topology.require_connected(anchor=checked_anchor(graph.num_poses, anchor), names=graph.ids)
-    form = fisher_rows(graph).joint()
-    solver = LogDetSolver(graph.edges, graph.num_poses, form.strongest_node())
-    entropy = entropy_of(solver.log_det(form), graph.num_poses - 1, graph.tangent_dim)
-    return EntropyEstimate(entropy.value, entropy.error)
+    forms = GraphForms(graph, anchor=0)
+    return entropy_of(forms.log_det("joint"), forms.num_free, forms.tangent_dim)
 
 
-def entropy_of(log_det: LogDet, num_free: int, tangent_dim: int, *, what: str = "joint entropy") -> LogDet:
+def entropy_of(
+    log_det: Estimate[Number], num_free: Number, tangent_dim: int, *, what: str = "joint entropy"
+) -> Estimate[Number]:
     """Entropy of `num_free` poses whose information has this log-determinant, with its error; errors call it `what`.
 
     Raises
@@ -80,4 +75,4 @@ def entropy_of(log_det: LogDet, num_free: int, tangent_dim: int, *, what: str = 
     IllConditionedError
         If the error exceeds 0.1 nats.
     """
-    return (-0.5 * log_det).plus(num_free * tangent_dim / 2 * LOG_2_PI_E).require_accuracy(what)
+    return (-0.5 * log_det).plus(tangent_dim / 2 * LOG_2_PI_E * num_free).known(what)

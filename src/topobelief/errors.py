@@ -10,9 +10,15 @@ import math
 from collections.abc import Collection, Sequence
 from os import PathLike, fspath
 
+from topobelief.symbols import node_name
+
 
 class TopobeliefError(Exception):
     """Root of all errors raised on purpose; its message is one line."""
+
+
+class ReadingWarning(UserWarning):
+    """A graph is not quite what its file says, because an option of reading dropped or assumed something; says what."""
 
 
 class InvalidInputError(TopobeliefError, ValueError):
@@ -51,10 +57,10 @@ class DisconnectedGraphError(InvalidGraphError):
 
     def __init__(self, nodes: Sequence[int], *, anchor: int, what: str = "graph") -> None:
         self.nodes = tuple(int(node) for node in nodes)
-        shown = ", ".join(str(node) for node in self.nodes[:5])
+        shown = ", ".join(map(node_name, self.nodes[:5]))
         more = f" and {len(self.nodes) - 5} more" if len(self.nodes) > 5 else ""
         super().__init__(
-            f"expected a connected {what}, got {len(self.nodes)} node(s) that node {anchor} does not reach: "
+            f"expected a connected {what}, got {len(self.nodes)} node(s) that node {node_name(anchor)} does not reach: "
             f"{shown}{more}; add the missing edges or keep one component"
         )
 
@@ -73,7 +79,6 @@ class InvalidActionError(InvalidInputError):
     def __init__(self, message: str, *, action: int | None = None, edge: int | None = None, label: str = "") -> None:
         self.action = action
         self.edge = edge
-        self.detail = message
         place = "action" if action is None else f"action {action}"
         if label:
             place += f" ({label!r})"
@@ -112,8 +117,23 @@ class InvalidMapError(InvalidInputError):
     """A floor plan is malformed."""
 
 
+class MapWarning(UserWarning):
+    """A floor plan can be read, but is likely to mean something else than it says."""
+
+
 class PlanningError(TopobeliefError):
     """No path can be planned: the start or the goal is outside the map, in collision, or unreachable."""
+
+
+def degrees_hint(angle: float) -> str:
+    """What to add to an error about an angle that is too large: it may be in degrees."""
+    if not math.isfinite(angle):
+        return ""
+    return f"; angles are in radians, and {angle:g} degrees are {math.radians(angle):.4g} radians"
+
+
+class NotOptimizedWarning(UserWarning):
+    """Entropies or bounds are asked for at poses that are far from the maximum-likelihood estimate."""
 
 
 def require_choice(name: str, value: str, choices: Collection[str]) -> None:

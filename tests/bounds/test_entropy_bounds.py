@@ -272,7 +272,7 @@ def test_the_paper_refuses_other_noise_and_names_the_way_out(information, messag
 
 def test_unknown_choices_are_refused():
     graph = PoseGraph(*SQUARE, np.eye(3))
-    with pytest.raises(InvalidInputError, match='expected family to be one of "paper", "fischer", got \'psi\''):
+    with pytest.raises(InvalidInputError, match='expected family to be one of "paper", "fischer", "fischer_step", got \'psi\''):
         entropy_bounds(graph, family="psi")
     with pytest.raises(InvalidInputError, match='expected determinant to be one of "cholesky", "hadamard", got \'qr\''):
         entropy_bounds(graph, determinant="qr")
@@ -306,3 +306,14 @@ def test_weights_that_almost_agree_are_not_rounded_to_one_another(family, where)
     except InvalidGraphError:
         return
     assert bounds.lower - 1e-10 <= J <= bounds.upper + 1e-10
+
+
+@pytest.mark.parametrize(("direction", "matters"), [((0, 0, 0), False), ((1, 2, -1), True)])
+def test_the_anchor_matters_on_a_line_but_not_in_one_place(direction, matters):
+    """In both I_rr before a pose is removed is singular, and the bounds are finite all the same."""
+    rng = np.random.default_rng(0)
+    poses = np.hstack([np.outer([0, 1, 3, 4], direction), rng.normal(size=(4, 4))])
+    graph = PoseGraph(poses, [(0, 1), (1, 2), (2, 3), (3, 0)], None, np.eye(6))
+    lower = [entropy_bounds(graph, anchor=anchor).lower for anchor in range(4)]
+    assert np.isfinite(lower).all()
+    assert bool(np.ptp(lower) > 1e-6) == matters

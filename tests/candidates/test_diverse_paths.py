@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from PIL import Image
 
 from data_files import data_file, map_file
+from topobelief.candidates.distinct_paths import DistinctPaths
 from topobelief.candidates.diverse_paths import diverse_paths
 from topobelief.candidates.homotopy import Rays, shortest_paths_by_class
 from topobelief.candidates.polyline import path_length
 from topobelief.candidates.roadmap import Roadmap, build_roadmap
 from topobelief.errors import InvalidInputError, PlanningError
-from topobelief.io.floor_plan import read_walls
+from topobelief.io.floor_plan import read_walls, read_world
 from topobelief.io.formats import read_pose_graph
 from topobelief.world import World
 
@@ -105,6 +109,42 @@ class TestPaths:
         assert len(paths) == 10
         centre = Rays(np.array([[45.0, 45.0]]))
         assert len({centre.word(path) for path in paths}) == 2, "both sides of the block are taken"
+
+    def test_that_fill_up_are_further_apart_than_a_sixteenth_of_a_ball_and_as_many_as_asked_for(self, roadmap: Roadmap) -> None:
+        paths = diverse_paths(roadmap, START, GOAL, num_paths=150)
+        check(roadmap, paths, START, GOAL, 1.3)
+        assert len(paths) == 150
+        assert len(set(words(roadmap, paths))) == 4
+        distinct = DistinctPaths(roadmap.vertices[:20])
+        for path in paths:
+            assert not distinct.any_within(path, 0.04 / 16 * 18)
+            distinct.add(path)
+
+    def test_fill_up_where_balls_are_smaller_than_the_robot(self) -> None:
+        """In a small room: 4 % of the way is 0.15 m."""
+        world = World.from_boxes([(2, 1.5, 2.4, 1.9)], (0, 0, 5, 4))
+        roadmap = build_roadmap(world, (0.6, 2), (4.4, 2), num_vertices=300)
+        assert len(diverse_paths(roadmap, (0.6, 2), (4.4, 2), num_paths=20)) == 20
+
+    @pytest.mark.parametrize("max_detour", [1.0, 1.0001])
+    def test_are_few_where_the_limit_leaves_no_room(self, roadmap: Roadmap, max_detour: float) -> None:
+        assert 1 <= len(diverse_paths(roadmap, START, GOAL, num_paths=20, max_detour=max_detour)) < 20
+
+    def test_on_a_map_with_salt_are_as_wide_spread_as_on_the_clean_one(self, tmp_path: Path) -> None:
+        """One cell in a thousand of the depot is occupied by noise: the classes of the specks take no path's place."""
+        clean = map_file("depot.yaml")
+        image = np.array(Image.open(clean.with_suffix(".pgm")))
+        image[np.random.default_rng(0).random(image.shape) < 0.001] = 0
+        Image.fromarray(image).save(tmp_path / "depot.pgm")
+        (tmp_path / "depot.yaml").write_text(clean.read_text())
+        start, goal = (12, 14.5), (1, 1)
+        spread = []
+        for file in (clean, tmp_path / "depot.yaml"):
+            roadmap = build_roadmap(read_world(file), start, goal)
+            lengths = [path_length(path) for path in diverse_paths(roadmap, start, goal)]
+            assert len(lengths) == 20
+            spread.append(lengths[-1] - lengths[0])
+        assert spread[1] > 0.9 * spread[0] > 4.0
 
     def test_in_the_office_are_20_with_at_least_3_classes_within_2_5_times_the_shortest(self) -> None:
         office = read_walls(map_file("willow_walls.csv"), bounds=(7, -9, 29, 9.5))

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shapely import LineString
 
-from topobelief.candidates.homotopy import Rays, inverse, joined, shortest_paths_by_class
+from topobelief.candidates.homotopy import Rays, count_classes, inverse, joined, shortest_paths_by_class
 from topobelief.candidates.roadmap import Roadmap, build_roadmap
 from topobelief.world import World
 
@@ -83,6 +83,50 @@ class TestRays:
         assert len(Rays.of_obstacles(roadmap, max_length=20, min_size=2.0).origins) == 1
         assert len(Rays.of_obstacles(roadmap, max_rays=2).origins) == 2
         assert len(Rays.of_obstacles(build_roadmap(World.from_boxes([], (0, 0, 9, 9)), (1, 1), (8, 8), 20)).origins) == 0
+
+
+class TestSpecks:
+    def test_make_no_class_however_many_and_obstacles_do(self) -> None:
+        """A map full of specks and one pillar: the specks stand in nobody's way, and take no ray from the pillar."""
+        x, y = np.meshgrid(np.arange(2, 28, 1.5), np.arange(2, 18, 1.5))
+        specks = np.stack([x, y, x + 0.1, y + 0.05], axis=-1).reshape(-1, 4)
+        specks = specks[~((specks[:, :2] > 8) & (specks[:, :2] < 12)).all(axis=1)]
+        world = World.from_boxes([*specks, (9.5, 9.5, 10.0, 10.0)], (0, 0, 30, 20))
+        roadmap = build_roadmap(world, (1, 1), (29, 19), num_vertices=300)
+        (origin,) = Rays.of_obstacles(roadmap, max_rays=3).origins
+        assert np.abs(origin - 9.75).max() < 0.7
+        assert len(Rays.of_obstacles(roadmap, specks=True).origins) > 150
+
+    @pytest.mark.parametrize(("length", "count"), [(0.6, 0), (1.2, 0), (1.8, 1), (6.0, 1)])
+    def test_that_the_robot_cannot_pass_between_are_a_fence_if_long_enough(self, length: float, count: int) -> None:
+        x = np.arange(0, length + 0.01, 0.6)
+        posts = np.stack([x + 5, np.full_like(x, 5), x + 5.05, np.full_like(x, 5.05)], axis=1)
+        roadmap = build_roadmap(World.from_boxes(posts, (0, 0, 16, 10)), (8, 1), (8, 9), num_vertices=100)
+        assert len(Rays.of_obstacles(roadmap).origins) == count
+
+    def test_are_smaller_for_a_smaller_robot(self) -> None:
+        world = World.from_boxes([(5, 5, 5.2, 5.2)], (0, 0, 10, 10))
+        counts = [len(Rays.of_obstacles(build_roadmap(world, (1, 1), (9, 9), 50, radius)).origins) for radius in (0.35, 0.25)]
+        assert counts == [0, 1]
+
+
+class TestCount:
+    def test_is_of_all_classes_however_many_obstacles_there_are(self) -> None:
+        """60 pillars in a row and a path above each of them, below the others: a class each."""
+        x = 2.0 * np.arange(60) + 2
+        pillars = np.stack([x, np.full_like(x, 4.5), x + 0.5, np.full_like(x, 5.5)], axis=1)
+        roadmap = build_roadmap(World.from_boxes(pillars, (0, 0, 123, 10)), (0.5, 2), (122, 2), num_vertices=200)
+        paths = [np.array([(0.5, 2), (a - 0.6, 2), (a - 0.6, 8), (a + 1.1, 8), (a + 1.1, 2), (122, 2)]) for a in x]
+        assert count_classes(roadmap, paths) == (60, True)
+        assert count_classes(roadmap, [*paths, *paths[:7]]) == (60, True)
+        assert count_classes(roadmap, paths[:1]) == (1, True)
+
+    def test_is_a_lower_bound_where_only_specks_part_some_paths(self) -> None:
+        world = World.from_boxes([(4.5, 4, 5.5, 6), (5, 8, 5.05, 8.05)], (0, 0, 10, 10))
+        roadmap = build_roadmap(world, (1, 5), (9, 5), num_vertices=100)
+        below, above, far_above = (np.array([(1, 5), (5, y), (9, 5)]) for y in (2.0, 7.0, 9.5))
+        assert count_classes(roadmap, [below, above]) == (2, True)
+        assert count_classes(roadmap, [below, above, far_above]) == (2, False)
 
 
 def lattice(columns: int, rows: int, seed: int) -> Roadmap:

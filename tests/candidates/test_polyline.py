@@ -12,11 +12,20 @@ from topobelief.candidates.polyline import (
     checked_path,
     distances_to_segments,
     path_length,
+    path_poses,
     sampled,
     stations,
     subdivided,
 )
 from topobelief.errors import InvalidInputError
+
+
+def test_poses_of_a_path_head_as_they_came() -> None:
+    """A repeated waypoint counts once."""
+    poses = path_poses([(0, 0), (0, 0), (3, 0), (3, 1), (2, 1)])
+    np.testing.assert_allclose(poses, [(0, 0, 0), (3, 0, 0), (3, 1, np.pi / 2), (2, 1, np.pi)])
+    assert path_poses([(4, 5)]).tolist() == [[4, 5, 0]]
+
 
 coordinates = st.integers(-20, 20).map(lambda value: value / 4)
 paths = st.lists(st.tuples(coordinates, coordinates), min_size=2, max_size=8, unique=True).map(np.array)
@@ -59,6 +68,13 @@ def test_distances_to_segments_agree_with_shapely(point: tuple[float, float], pa
     distances = distances_to_segments(np.array(point), path[:-1], path[1:])
     expected = [LineString(path[i : i + 2]).distance(Point(point)) for i in range(len(path) - 1)]
     np.testing.assert_allclose(distances, expected, atol=1e-12)
+
+
+def test_distances_of_several_points_to_several_segments_are_those_of_each_pair() -> None:
+    points, starts, ends = np.random.default_rng(0).normal(size=(3, 4, 2))
+    together = distances_to_segments(points[:, None], starts, ends)
+    np.testing.assert_array_equal(together, [distances_to_segments(point, starts, ends) for point in points])
+    assert distances_to_segments(points[:0, None], starts, ends).shape == (0, 4)
 
 
 def test_a_segment_of_no_length_is_a_point() -> None:

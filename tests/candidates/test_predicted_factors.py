@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from topobelief import Action, PoseGraph, posterior
 from topobelief.candidates.polyline import path_length
 from topobelief.candidates.predicted_factors import default_information, predict_actions
-from topobelief.errors import InvalidInputError
+from topobelief.errors import InvalidInputError, PlanningError
 from topobelief.world import World
 
 OMEGA = np.diag([100.0, 100.0, 800.0])
@@ -141,9 +141,94 @@ class TestEdges:
     def test_each_path_makes_an_action_of_its_own(self) -> None:
         graph = drive([(0, 0), (1, 0)])
         actions = predict_actions(graph, [[(1, 0), (4, 0)], np.array([(1.0, 0.0), (1.0, 2.0)])])
-        assert [action.label for action in actions] == ["path 1", "path 2"]
+        assert [action.label for action in actions] == ["path 0", "path 1"]
         assert [action.num_new_poses for action in actions] == [3, 2]
         assert predict_actions(graph, []) == []
+
+
+class TestStart:
+    """The robot need not stand at the last pose: here it is at (2, 0), index 2 of 6."""
+
+    GRAPH = drive([(0, 0), (1, 0), (2, 0), (2, 4), (2, 5), (2, 6)])
+
+    def test_new_poses_hang_on_the_pose_that_is_chosen(self) -> None:
+        action = predict(self.GRAPH, [(2, 0), (2, -3)], start=2)
+        assert action.edges.tolist() == [[2, 6], [6, 7], [7, 8]]
+        np.testing.assert_allclose(action.poses[:, :2], [(2, -1), (2, -2), (2, -3)])
+        assert posterior(self.GRAPH, action).num_poses == 9
+
+    def test_the_last_pose_is_the_default_and_may_be_counted_from_the_end(self) -> None:
+        for start in (5, -1, np.int64(5)):
+            action, default = (predict(self.GRAPH, [(2, 6), (2, 8)], **rule) for rule in ({"start": start}, {}))
+            assert action.edges.tolist() == default.edges.tolist()
+
+    def test_poses_that_led_to_the_start_are_no_loop_but_those_behind_it_are(self) -> None:
+        """Up from (2, 0) past the poses at y = 4 to 6; pose 0 is three steps from the first new pose."""
+        action = predict(self.GRAPH, [(2, 0), (2, 5)], start=2, min_index_gap=4, closure_radius=2.5)
+        assert not {(6, 0), (6, 1), (6, 2), (7, 2)} & closures(action)
+        assert (7, 0) not in closures(action)  # too far; four steps would do
+        assert {(7, 3), (8, 3), (8, 4), (9, 3), (9, 4), (9, 5), (10, 3)} <= closures(action)
+        assert (6, 0) in closures(predict(self.GRAPH, [(2, 0), (2, 5)], start=2, min_index_gap=3, closure_radius=2.5))
+
+    def test_a_place_is_joined_to_the_nearest_pose_in_sight(self) -> None:
+        """(2, 2.5) is nearest to pose 3; a wall between them leaves pose 2."""
+        wall = World.from_boxes([(-3, 2.9, 5, 3.1)], (-3, -3, 5, 8))
+        for world, pose in ((None, 3), (wall, 2)):
+            action = predict(self.GRAPH, [(2, 2.5), (4, 2.5)], start=(2, 2.5), world=world)
+            assert action.edges[0].tolist() == [pose, 6]
+            assert action.length == pytest.approx(2)
+        np.testing.assert_allclose(action.poses[:, :2], [(2, 1), (2, 2), (2.5, 2.5), (3.5, 2.5), (4, 2.5)])
+
+    def test_a_place_where_a_pose_is_is_that_pose_the_last_of_several(self) -> None:
+        graph = drive([(0, 0), (1, 0), (1, 0), (3, 0)])
+        assert predict(graph, [(1, 0), (1, 2)], start=(1, 0)).edges[0].tolist() == [2, 4]
+        assert predict(graph, [(1, 0), (1, 2)], start=graph.poses[1]).edges[0].tolist() == [2, 4]
+
+    def test_a_place_that_no_pose_sees_is_refused(self) -> None:
+        cell = World.from_boxes([(3, 3, 3.1, 5), (3, 3, 5, 3.1)], (-3, -3, 5, 5))
+        with pytest.raises(PlanningError, match=r"in sight of a pose of the graph, got \(4, 4\)"):
+            predict(self.GRAPH, [(4, 4), (4.5, 4.5)], start=(4, 4), world=cell)
+
+    @pytest.mark.parametrize("start", [6, -7, (1.0,), (math.nan, 0.0), "here"])
+    def test_what_is_no_start_is_refused(self, start: object) -> None:
+        with pytest.raises(InvalidInputError, match="expected start"):
+            predict(self.GRAPH, [(2, 0), (2, -3)], start=start)
+
+    def test_in_space_a_place_has_no_height(self) -> None:
+        graph = PoseGraph([[0, 0, z, 0, 0, 0, 1] for z in range(2)], [(0, 1)], None, np.eye(6))
+        assert predict(graph, [(0, 0), (1, 0)], start=0).poses[0, 2] == 0
+        with pytest.raises(InvalidInputError, match=r"index of a pose in a graph in SE\(3\)"):
+            predict(graph, [(0, 0), (1, 0)], start=(0, 0))
+
+
+class TestLength:
+    def test_is_that_of_the_path_whatever_the_spacing(self) -> None:
+        path = [(0, 0), (3, 0), (3, 4), (0, 4)]
+        assert [predict(ORIGIN, path, information=OMEGA, spacing=step).length for step in (0.3, 1, 100)] == [10, 10, 10]
+
+    def test_counts_the_way_to_a_path_that_begins_elsewhere(self) -> None:
+        assert predict(ORIGIN, [(3, 0), (3, 4)], information=OMEGA).length == 7
+
+
+class TestWalls:
+    WORLD = World.from_boxes([(2, -1, 2.2, 1)], (-5, -5, 5, 5))
+
+    def test_a_path_through_one_is_refused_by_name(self) -> None:
+        clear, through = [(0, 0), (1, 0)], [(0, 0), (1, 0), (3, 0)]
+        with pytest.raises(PlanningError, match=r"path 1 in the free space .* between \(1.00, 0.00\) and \(3.00, 0.00\)"):
+            predict_actions(ORIGIN, [clear, through], information=OMEGA, world=self.WORLD)
+        assert predict(ORIGIN, through, information=OMEGA).num_new_poses == 3
+
+    @pytest.mark.parametrize("path", [[(3, 0), (4, 0)], [(9, 0)], [(0, 0), (0, 6)]], ids=["on the way there", "beyond", "out"])
+    def test_so_is_one_that_is_reached_through_one_or_leaves_the_map(self, path: list) -> None:
+        with pytest.raises(PlanningError, match="path 0 in the free space"):
+            predict(ORIGIN, path, information=OMEGA, world=self.WORLD)
+
+    def test_from_a_pose_that_the_map_has_in_a_wall_a_path_may_begin_beside_it(self) -> None:
+        inside = drive([(0, 0), (2.1, 0)])
+        assert predict(inside, [(2.5, 0), (4, 0)], world=self.WORLD).num_new_poses == 2
+        with pytest.raises(PlanningError, match="path 0 in the free space"):
+            predict(inside, [(2.1, 0), (4, 0)], world=self.WORLD)
 
 
 class TestInformation:
@@ -187,6 +272,7 @@ class TestInformation:
         ({"spacing": math.inf}, "spacing above 0, got inf"),
         ({"closure_radius": -1}, "closure_radius above 0, got -1"),
         ({"closure_angle": 4}, "closure_angle above 0 and at most 3.14159, got 4"),
+        ({"closure_angle": 60}, "got 60; angles are in radians, and 60 degrees are 1.047 radians"),
         ({"closure_angle": math.nan}, "closure_angle .* got nan"),
         ({"min_index_gap": 1}, "min_index_gap of at least 2"),
     ],

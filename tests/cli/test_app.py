@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from importlib.metadata import version
@@ -11,9 +12,11 @@ from typing import get_args
 import pytest
 
 from topobelief.bounds.entropy_bounds import Determinant
-from topobelief.cli import app, main, plan, plan_stages
+from topobelief.cli import app, main, plan, plan_stages, reading
+from topobelief.io import reading as io_reading
 from topobelief.io import ros_map
-from topobelief.planning import evaluation, objectives, planner
+from topobelief.planning import planner
+from topobelief.planning.registry import AUTO, BOUNDS, OBJECTIVES, SIGNATURES
 
 
 def test_version_is_that_of_the_distribution(topobelief):
@@ -32,6 +35,30 @@ def test_every_command_has_help(topobelief, command):
     outcome = topobelief([command, "--help"])
     assert outcome.code == 0
     assert "GRAPH" in outcome.out
+
+
+@pytest.mark.parametrize("command", ["plan", "info", "simulate", "simulate-compare", "reproduce", "study", "benchmark"])
+def test_help_is_whole_in_a_terminal_of_80_columns(topobelief, monkeypatch, command):
+    """No option, choice or text is cut off, which the help marks by an ellipsis behind a letter."""
+    monkeypatch.setenv("COLUMNS", "80")
+    shown = topobelief([command, "--help"]).out
+    assert max(map(len, shown.splitlines())) <= 80
+    assert not re.search(r"[\w-]…", shown)
+    words = set(re.split(r"[\s,;:.]+", shown))
+    if command == "plan":
+        kinds = (plan.Determinant, plan.Proof, plan.Unknown)
+        assert {"--no-line-of-sight", "--allow-dense-spectrum", "--max-evaluations"} <= words
+        assert {choice for kind in kinds for choice in get_args(kind)} <= words
+        assert {*OBJECTIVES, *SIGNATURES, *BOUNDS, AUTO} <= words
+
+
+def test_a_shell_completes_options(office):
+    """As bash asks for it once `--install-completion` has run."""
+    code = "import sys; from topobelief.cli import main; main()"
+    asked = {"_TOPOBELIEF_COMPLETE": "complete_bash", "COMP_WORDS": "topobelief plan --clos", "COMP_CWORD": "2"}
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env={**os.environ, **asked})
+    assert result.stdout.split() == ["--closure-radius", "--closure-angle"]
+    assert result.stderr == ""
 
 
 def test_help_loads_nothing_heavy():
@@ -54,16 +81,20 @@ def test_the_entry_point_exits_with_the_code(capsys):
 @pytest.mark.parametrize(
     ("offered", "known"),
     [
-        (plan.Objective, objectives.ObjectiveName),
-        (plan.Signature, evaluation.SignatureName),
-        (plan.Family, planner.BoundsName),
-        (plan.Determinant, Determinant),
-        (plan.Proof, planner.Proof),
-        (plan.Unknown, ros_map.Unknown),
+        (plan.Determinant, get_args(Determinant)),
+        (plan.Proof, get_args(planner.Proof)),
+        (plan.Unknown, get_args(ros_map.Unknown)),
+        (reading.Edge2Order, get_args(io_reading.Edge2Order)),
     ],
 )
 def test_the_options_offer_exactly_the_choices_of_the_library(offered, known):
-    assert set(get_args(offered)) == set(get_args(known))
+    assert set(get_args(offered)) == set(known)
+
+
+@pytest.mark.parametrize("command", ["plan", "info"])
+def test_help_names_all_that_can_be_dropped(topobelief, command):
+    told = topobelief([command, "--help"]).out
+    assert {word for word in get_args(io_reading.Droppable) if word not in told} == set()
 
 
 def test_a_terminal_without_greek_letters_is_no_bug(office):
@@ -90,3 +121,16 @@ def test_a_bug_keeps_its_traceback(topobelief, office, monkeypatch):
     monkeypatch.setattr(plan_stages, "find_candidates", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         topobelief(office.plan())
+
+
+@pytest.mark.filterwarnings("default")
+def test_a_warning_is_one_line(topobelief, office, tmp_path):
+    """Here of a map in whose grey the robot stands; the goal outside ends the command."""
+    (tmp_path / "map.pgm").write_bytes(b"P5\n2 2\n255\n" + bytes([205, 205, 254, 254]))
+    (tmp_path / "map.yaml").write_text(
+        "image: map.pgm\nresolution: 2\norigin: [8, 8, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n"
+    )
+    arguments = [str(office.graph_file), "--map", "map.yaml", "--goal", "0", "5"]
+    warning, error = topobelief(["plan", *arguments]).err.splitlines()
+    assert warning.startswith("topobelief: warning: map.yaml: free_thresh 0.25 makes the grey 205 free")
+    assert error.startswith("topobelief: ")

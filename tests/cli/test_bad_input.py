@@ -32,6 +32,8 @@ def files(tmp_path: Path) -> Path:
     (tmp_path / "binary.g2o").write_bytes(b"VERTEX_SE2\0\x01\x02")
     (tmp_path / "folder.g2o").mkdir()
     (tmp_path / "disconnected.g2o").write_text(DISCONNECTED)
+    (tmp_path / "map.yaml").write_text("image: map.pgm\n")
+    (tmp_path / "landmarks.g2o").write_text("VERTEX_XY 7 1 2\n" + DISCONNECTED)
     (tmp_path / "islands.g2o").write_text("EDGE_SE2 1 2 1 0 0 1 0 0 1 0 1\nEDGE_SE2 3 4 1 0 0 1 0 0 1 0 1\n")
     (tmp_path / "truncated.g2o").write_text("VERTEX_SE2 0 0 0 0\nEDGE_SE2 0 1 1 0\n")
     return tmp_path
@@ -46,15 +48,34 @@ def files(tmp_path: Path) -> Path:
         ("binary.g2o", "got a binary one"),
         ("folder.g2o", "got a directory"),
         ("truncated.g2o", "truncated.g2o:2: expected"),
-        ("disconnected.g2o", "disconnected.g2o: expected a connected graph, got 1 node(s) that node 7 does not reach: 9"),
-        ("islands.g2o", "islands.g2o: "),
-        ("graph.txt", "expected a name that ends in .g2o"),
+        ("islands.g2o", "add the missing edges or keep one component, with --component largest"),
+        ("map.yaml", "map.yaml:1: expected VERTEX_SE2, EDGE_SE2, VERTEX_SE3:QUAT, EDGE_SE3:QUAT, VERTEX2, EDGE2 or FIX"),
+        ("landmarks.g2o", "landmarks.g2o:1: expected poses and plain edges between them, got landmarks (VERTEX_XY on line 1)"),
     ],
 )
 def test_graph_files_that_are_wrong(topobelief, files, command, name, message):
     outcome = topobelief([command[0], str(files / name), *command[1:]])
     assert message in one_line(outcome)
     assert outcome.out == ""
+
+
+def test_plan_refuses_a_disconnected_graph_and_offers_its_largest_part(topobelief, files):
+    message = one_line(topobelief(["plan", str(files / "disconnected.g2o"), "--along-trajectory", "--goal", "1", "2"]))
+    assert "disconnected.g2o: expected a connected graph, got 1 node(s) that node 7 does not reach: 9" in message
+    assert "keep one component, with --component largest (2 of 3 poses) or --component ID" in message
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--drop", "walls"], 'expected drop to be one of "priors", "gps"'),
+        (["--drop", "robust", "--robust-as-plain"], "expected robust edges to be dropped or read as plain ones, got both"),
+        (["--edge2-order", "g2o"], "'--edge2-order'"),
+        (["--component", "smallest"], 'expected component to be "all", "largest" or the id of a pose, got \'smallest\''),
+    ],
+)
+def test_options_of_reading_that_make_no_sense(topobelief, files, options, message):
+    assert message in one_line(topobelief(["info", str(files / "disconnected.g2o"), *options]))
 
 
 @pytest.mark.parametrize(
@@ -88,7 +109,14 @@ def test_a_goal_behind_walls(topobelief, office, tmp_path):
         (["--candidates", "many"], "'--candidates'"),
         (["--max-detour", "0.5"], "'--max-detour': expected a factor of at least 1"),
         (["--max-detour", "far"], "'--max-detour': expected a factor of at least 1"),
-        (["--closure-angle", "4"], "expected closure_angle above 0 and at most 3.14159"),
+        (["--closure-angle", "4"], "'--closure-angle': expected at most 3.14159, got 4; angles are in radians, and 4 degrees"),
+        (["--sigma-p", "0.1", "--sigma-theta", "2"], "'--sigma-theta': expected at most 1.8138, got 2; angles are in radians"),
+        (["--goal", "5", "0"], "'--goal': expected it once, got it twice"),
+        (["--seed", "1", "--seed", "2", "--seed", "3"], "'--seed': expected it once, got it 3 times"),
+        (["--start", "21"], "expected --start as the id of a pose of the file (from 0 to 20) or as X Y, got 21"),
+        (["--start", "2.5"], "'--start': expected the id of a pose or X Y in metres, got '2.5'"),
+        (["--start", "nan", "1"], "'--start': expected the id of a pose or X Y in metres, got 'nan 1'"),
+        (["--start", "5", "5"], "expected a start in sight of a pose of the graph, got (5, 5)"),
         (["--objective", "fame"], "'--objective'"),
         (["--proof", "optimal", "--margin", "-50"], "expected a margin or proof"),
         (["--sigma-p", "0.1"], "expected both --sigma-p and --sigma-theta or neither"),
@@ -125,7 +153,9 @@ def test_a_graph_in_space_cannot_be_planned_on_in_the_plane(topobelief, office, 
     poses = np.array([[0, 0, 0, 0, 0, 0, 1], [1, 0, 0, 0, 0, 0, 1]])
     write_g2o(PoseGraph(poses, [(0, 1)], None, np.eye(6)), tmp_path / "space.g2o")
     arguments = ["plan", str(tmp_path / "space.g2o"), "--map", str(office.map_file), "--goal", "0", "5"]
-    assert "expected a graph in SE(2) to plan in the plane, got one in SE(3)" in one_line(topobelief(arguments))
+    message = one_line(topobelief(arguments))
+    assert "expected a graph in SE(2) to plan in the plane, got one in SE(3); if it is planar" in message
+    assert "pass --planar" in message
 
 
 @pytest.mark.parametrize("arguments", [["fly"], ["plan"], ["info", "a.g2o", "b.g2o"]])

@@ -15,7 +15,7 @@ from topobelief.experiments.benchmark.sessions import city_drive
 @pytest.fixture
 def tiny(monkeypatch):
     plan = BenchmarkPlan(
-        sizes=(30,), num_actions=3, repetitions=1, num_seeds=1, bounds_size=40, bounds_actions=4, memory_sizes=(20,)
+        sizes=(30,), num_actions=3, repetitions=1, num_seeds=1, bounds_size=40, bounds_actions=4, memory_sizes=(20,), small=None
     )
     monkeypatch.setattr(BenchmarkPlan, "quick", staticmethod(lambda: plan))
 
@@ -51,7 +51,7 @@ def test_a_file_alone(tiny, tmp_path, capsys):
     document = json.loads(capsys.readouterr().out)
     assert [session["name"] for session in document["sessions"]] == ["mine"]
     assert document["memory"] == document["error_bounds"] == []
-    assert len(document["proofs"]) == 6
+    assert len(document["proofs"]) == 9
 
 
 def test_options_go_before_the_quick_plan_and_json_is_all_that_is_printed(tiny, capsys):

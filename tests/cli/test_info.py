@@ -17,6 +17,8 @@ from topobelief.io.g2o import read_g2o, write_g2o
 from topobelief.signatures.spanning_trees import log_num_spanning_trees, spanning_tree_signature
 from topobelief.signatures.von_neumann import von_neumann_entropy, von_neumann_entropy_approx
 
+X5 = (ord("x") << 56) + 5
+
 
 def facts(topobelief, *arguments: object) -> dict:
     outcome = topobelief(["info", *map(str, arguments), "--json"])
@@ -96,3 +98,54 @@ def test_graphs_in_space_are_described_too(topobelief):
     assert outcome.code == 0
     assert "SE(3)" in outcome.out
     assert "its bounds, fischer, cholesky" in outcome.out
+
+
+PARTS = """VERTEX_SE2 1 0 0 0
+VERTEX_SE2 2 1 0 0
+VERTEX_SE2 3 2 0 0
+VERTEX_SE2 8646911284551352325 9 9 0
+EDGE_SE2 1 2 1.5 0 0 1 0 0 1 0 1
+EDGE_SE2 2 3 1 0 0 1 0 0 1 0 1
+EDGE_SE2 1 3 2 0 0 1 0 0 1 0 1
+EDGE_SE2_PRIOR 1 0 0 0 1 0 0 1 0 1
+"""
+
+
+def test_a_disconnected_graph_is_described_by_its_components(topobelief, tmp_path):
+    """Sizes and fit of each part, the largest first; a pose without an edge is a part."""
+    (tmp_path / "parts.g2o").write_text(PARTS)
+    found = facts(topobelief, tmp_path / "parts.g2o", "--drop", "priors")
+    assert (found["num_poses"], found["num_edges"], found["num_components"], found["length"]) == (4, 3, 2, 2.0)
+    assert found["components"] == [
+        {"num_poses": 3, "num_edges": 3, "first": 1, "last": 3, "chi2_per_dof_filed": 0.25 / 3},
+        {"num_poses": 1, "num_edges": 0, "first": X5, "last": X5, "chi2_per_dof_filed": None},
+    ]
+    assert "joint_entropy" not in found
+    told = topobelief(["info", str(tmp_path / "parts.g2o"), "--drop", "priors"]).out
+    for text in ("2 components", "3 poses, 1 … 3", "3 edges, χ² per degree of freedom 0.08333 as filed", "pose x5", "no edges"):
+        assert text in told
+
+
+def test_what_was_dropped_is_told(topobelief, tmp_path):
+    """To a person as a line before the tables, to a program as notes."""
+    (tmp_path / "parts.g2o").write_text(PARTS)
+    options = ["--drop", "priors", "--component", "largest"]
+    found = facts(topobelief, tmp_path / "parts.g2o", *options)
+    assert found["num_components"] == 1
+    assert found["joint_entropy"] > 0
+    assert len(found["notes"]) == 2
+    told = topobelief(["info", str(tmp_path / "parts.g2o"), *options]).out
+    assert told.splitlines()[:2] == found["notes"]
+    assert found["notes"][0].endswith(
+        "parts.g2o: dropped absolute priors on poses: EDGE_SE2_PRIOR on line 8; what they measure is not counted"
+    )
+
+
+def test_a_crowd_of_components_is_cut_short(topobelief, tmp_path):
+    lines = [f"VERTEX_SE2 {k} {k} 0 0" for k in range(13)] + ["EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1"]
+    (tmp_path / "crowd.g2o").write_text("\n".join(lines))
+    told = topobelief(["info", str(tmp_path / "crowd.g2o")]).out
+    assert "2 poses, 0 … 1" in told
+    assert "1 edge, a tree" in told
+    assert told.splitlines()[-1].split() == ["and", "smaller", "ones", "2"]
+    assert len(facts(topobelief, tmp_path / "crowd.g2o")["components"]) == 12

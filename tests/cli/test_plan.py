@@ -11,16 +11,17 @@ import pytest
 
 from data_files import data_file
 from topobelief.candidates.diverse_paths import diverse_paths
+from topobelief.candidates.polyline import path_length
 from topobelief.candidates.predicted_factors import predict_actions
 from topobelief.candidates.roadmap import build_roadmap
 from topobelief.cli import plan_files, plan_stages
 from topobelief.cli.console import Reporter
 from topobelief.entropy import joint_entropy
-from topobelief.errors import FileError
+from topobelief.errors import FileError, IllConditionedError
 from topobelief.estimation import optimize
 from topobelief.graph.action import posterior
 from topobelief.io.floor_plan import read_world
-from topobelief.io.g2o import read_g2o
+from topobelief.io.g2o import read_g2o, write_g2o
 from topobelief.planning.decision import Candidate, Decision
 from topobelief.planning.planner import Planner
 
@@ -93,7 +94,7 @@ def test_exact_values_stand_apart_from_the_decision_that_did_not_need_them(topob
     graph, _, actions, _ = by_hand
     assert written["num_evaluations"] == 0
     for row, action in zip(written["actions"], actions, strict=True):
-        assert row["entropy"] == "nan"
+        assert row["entropy"] is None
         assert row["exact_for_comparison"] == pytest.approx(joint_entropy(posterior(graph, action)), abs=1e-6)
 
 
@@ -184,6 +185,135 @@ def test_files_are_written_together_or_not_at_all(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["first"]
 
 
+def test_the_start_is_told(topobelief, office):
+    filed = topobelief(office.plan("--candidates", 2, "--no-optimize")).out
+    assert "from pose 20, the last of the file, at (10.00, 10.00)" in filed
+    plan = document(topobelief, office.plan("--candidates", 2))
+    assert plan["start_pose"] == {"index": 20, "id": 20}
+    assert plan["notes"] == []
+
+
+def test_the_start_can_be_a_pose_or_a_place(topobelief, office):
+    filed = office.plan("--candidates", 2, "--no-optimize", "--start")
+    pose = document(topobelief, [*filed, "3"])
+    assert pose["start"] == office.graph.poses[3].tolist()
+    assert pose["start_pose"] == {"index": 3, "id": 3}
+    assert pose["actions"][0]["waypoints"][0] == [3, 0]
+    place = document(topobelief, [*filed, "2.5", "1.5"])
+    assert place["start"] == [2.5, 1.5]
+    assert place["start_pose"]["index"] in (2, 3)
+    assert place["actions"][0]["waypoints"][0] == [2.5, 1.5]
+    assert place["options"]["start"] == "2.5 1.5"
+    assert "from (2.50, 1.50), 1.58 m from pose" in topobelief([*filed, "2.5", "1.5"]).out
+
+
+TAG = """VERTEX_SE2 0 0 0 0
+VERTEX_SE2 1 2 0 1.57
+VERTEX_SE2 2 2 2 3.14
+VERTEX_SE2 1007 -3 4 0
+EDGE_SE2 0 1 2 0 1.57 100 0 0 100 0 400
+EDGE_SE2 1 2 2 0 1.57 100 0 0 100 0 400
+EDGE_SE2 1 1007 4 5 -1.57 50 0 0 50 0 50
+EDGE_SE2 2 1007 5 -2 -3.14 50 0 0 50 0 50
+"""
+
+
+def test_a_last_pose_where_the_odometry_does_not_end_is_pointed_out(topobelief, tmp_path):
+    (tmp_path / "tag.g2o").write_text(TAG)
+    arguments = ["plan", "tag.g2o", "--along-trajectory", "--goal", "0", "0", "--width", "1", "--vertices", "50"]
+    outcome = topobelief(arguments)
+    assert "from pose 1007, the last of the file" in outcome.out
+    assert "the odometry from the first pose on ends at pose 2, not at pose 1007" in outcome.out
+    chosen = topobelief([*arguments, "--start", "2"])
+    assert "from pose 2 at (2." in chosen.out
+    assert "1007" not in chosen.out
+
+
+def test_exact_values_that_cannot_be_had_cost_neither_decision_nor_files(topobelief, office, tmp_path, monkeypatch):
+    def fails(*_: object) -> None:
+        raise IllConditionedError("joint entropy", 3.0)
+
+    monkeypatch.setattr(Planner, "entropies", fails)
+    outcome = topobelief(office.plan("--candidates", 3))
+    assert (outcome.code, outcome.err) == (0, "")
+    assert "exact values in the picture: 3 of 3 cannot be had; joint entropy: the graph is too ill-conditioned" in outcome.out
+    assert {path.name for path in (tmp_path / "out").iterdir()} == PICTURES | {"decision.json"}
+
+
+def test_a_picture_that_fails_does_not_cost_the_decision(topobelief, office, tmp_path, monkeypatch):
+    monkeypatch.setattr("topobelief.report.bounds_figure.draw_bounds", lambda *_: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        topobelief(office.plan("--candidates", 2))
+    assert Decision.from_dict(json.loads((tmp_path / "out" / "decision.json").read_text())).num_actions == 2
+
+
+@pytest.mark.parametrize(
+    ("wall", "note"),
+    [
+        ("3.5,-0.1,4.5,0.1", "1 of 21 poses is not in free space\n"),
+        ("-0.5,-0.1,4.5,0.1", "5 of 21 poses are not in free space: another map or another frame?\n"),
+    ],
+)
+def test_poses_outside_the_map_are_counted(topobelief, office, tmp_path, wall, note):
+    """One in a wall is an error of the map; many, and the map may be another one."""
+    (tmp_path / "walls.csv").write_text(f"{office.map_file.read_text()}{wall}\n")
+    arguments = ["plan", str(office.graph_file), "--map", "walls.csv", "--goal", "0", "5", "--candidates", "2"]
+    outcome = topobelief([*arguments, "--no-optimize"])
+    assert outcome.code == 0
+    assert note in outcome.out
+
+
+def test_a_start_outside_the_map_says_how_many_poses_are(topobelief, office, tmp_path):
+    (tmp_path / "far.csv").write_text("x_min,y_min,x_max,y_max\n90,90,99,90.2\n90,99,99,99.2\n")
+    outcome = topobelief(["plan", str(office.graph_file), "--map", "far.csv", "--goal", "95", "95"])
+    assert outcome.code == 2
+    assert outcome.err.count("\n") == 1
+    assert outcome.err.rstrip().endswith("21 of 21 poses are not in free space: another map or another frame?")
+
+
+def test_lengths_are_those_of_the_paths_everywhere(topobelief, office, tmp_path):
+    """Also where poses are so far apart that they cut the corners."""
+    outcome = topobelief(office.plan("--candidates", 4, "--spacing", 100))
+    written = json.loads((tmp_path / "out" / "decision.json").read_text())
+    lengths = [path_length(action["waypoints"]) for action in written["actions"]]
+    assert [action["length"] for action in written["actions"]] == pytest.approx(lengths)
+    assert written["chosen"]["length"] == pytest.approx(lengths[written["best"]])
+    rows = [line.split() for line in outcome.out.splitlines() if line.split()[1:2] == ["path"]]
+    assert {int(row[2]): float(row[-2]) for row in rows} == {index: round(each, 1) for index, each in enumerate(lengths)}
+    assert f"({lengths[written['best']]:.1f} m, " in outcome.out
+    assert f"{min(lengths):.1f} to {max(lengths):.1f} m" in outcome.out
+
+
+def test_labels_are_indices_and_the_chosen_path_can_be_driven(topobelief, office):
+    plan = document(topobelief, office.plan("--candidates", 5))
+    assert [(each["index"], each["label"]) for each in plan["actions"]] == [(k, f"path {k}") for k in range(5)]
+    chosen = plan["chosen"]
+    assert (chosen["index"], chosen["label"]) == (plan["best"], f"path {plan['best']}")
+    poses = np.array(chosen["x_y_yaw"])
+    assert poses[:, :2].tolist() == plan["actions"][plan["best"]]["waypoints"]
+    step = np.diff(poses[:, :2], axis=0)
+    assert np.allclose(poses[1:, 2], np.arctan2(step[:, 1], step[:, 0]))
+
+
+def test_where_there_is_nothing_to_choose_from_the_output_says_what_would_bring_more(topobelief, office):
+    one = topobelief(office.plan("--candidates", 1)).out
+    assert "is the only candidate: there is nothing to choose from." in one
+    assert "raise --candidates (1 now)" in one
+    narrow = topobelief(office.plan("--candidates", 20, "--max-detour", 1)).out
+    assert "raise --max-detour (1 now), lower --robot-radius (0.35 m now) or raise --vertices (200 now)" in narrow
+
+
+def test_poses_far_from_the_estimate_are_pointed_out(topobelief, office, tmp_path):
+    stretched = office.graph.with_poses(office.graph.poses * [1, 1.5, 1])
+    write_g2o(stretched, tmp_path / "far.g2o")
+    arguments = ["plan", "far.g2o", "--along-trajectory", "--goal", "5", "0", "--candidates", "2", "--vertices", "50"]
+    outcome = topobelief([*arguments, "--no-optimize"])
+    assert "far from the maximum-likelihood estimate" in outcome.out
+    assert "leave out --no-optimize" in outcome.out
+    assert outcome.err == ""
+    assert "far from" not in topobelief(arguments).out
+
+
 def decision_of(poses: list[int], objective: str = "joint") -> Decision:
     """Actions with so many new poses, ranked as listed."""
     count = len(poses)
@@ -228,3 +358,27 @@ def test_a_ranking_that_counts_poses_is_called_so():
 )
 def test_other_rankings_are_not(decision):
     assert plan_stages.length_bias_hint(decision) is None
+
+
+def test_where_specks_part_some_paths_the_number_of_classes_is_a_lower_bound(topobelief, office, tmp_path):
+    """The room's pillar makes 2 classes; specks all around it, which make none, may part more paths."""
+    specks = "".join(f"{x},{y},{x + 0.05},{y + 0.05}\n" for x in range(1, 10) for y in (1, 2, 8, 9))
+    (tmp_path / "specks.csv").write_text(office.map_file.read_text() + specks)
+    arguments = office.plan("--candidates", 12, "--max-detour", 2)
+    assert ": 2 homotopy classes, " in topobelief(arguments).out
+    arguments[arguments.index(str(office.map_file))] = str(tmp_path / "specks.csv")
+    assert ": at least 2 homotopy classes, " in topobelief(arguments).out
+
+
+def test_the_graph_is_read_as_the_options_say(topobelief, office, tmp_path):
+    """A lone pose far away and a prior are left out, and told; the plan is that of the rest."""
+    graph_file = tmp_path / "parts.g2o"
+    graph_file.write_text(
+        office.graph_file.read_text() + "VERTEX_SE2 999 50 50 0\nEDGE_SE2_PRIOR 0 0 0 0 1 0 0 1 0 1\n", encoding="utf-8"
+    )
+    arguments = office.plan("--candidates", 2, "--component", "largest", "--drop", "priors", "--no-exact")
+    arguments[1] = str(graph_file)
+    told = topobelief(arguments).out.splitlines()
+    assert told[0].startswith(f"{graph_file}: dropped absolute priors on poses: EDGE_SE2_PRIOR on line ")
+    assert told[1] == f"{graph_file}: kept one of 2 components: 21 of 22 poses (0 … 20)"
+    assert told[2] == f"{graph_file}: 21 poses, 24 edges"

@@ -7,16 +7,14 @@ import json
 import os
 import signal
 from pathlib import Path
-from typing import get_args
 
 import numpy as np
 import pytest
 
 from topobelief.cli.interruption import stop_on_interrupt
-from topobelief.cli.simulate import Objective
 from topobelief.io.g2o import read_g2o
 from topobelief.io.ros_map import read_ros_map
-from topobelief.planning.objectives import ObjectiveName
+from topobelief.planning.decision import SCHEMA
 
 ROOM = """map: walls.csv
 start: [1.5, 1.5]
@@ -31,10 +29,6 @@ def room(tmp_path) -> Path:
     path = tmp_path / "room.yaml"
     path.write_text(ROOM)
     return path
-
-
-def test_objectives_are_the_planners():
-    assert get_args(Objective) == get_args(ObjectiveName)
 
 
 def test_a_run_leaves_everything(topobelief, room, tmp_path):
@@ -55,7 +49,7 @@ def test_a_run_leaves_everything(topobelief, room, tmp_path):
     assert document["outcome"] == "arrived"
     assert graph.num_poses == document["metrics"]["poses"] == len(rows)
     np.testing.assert_allclose([float(row["graph_x"]) for row in rows], graph.poses[:, 0], atol=1e-6)
-    assert json.loads((run / "leg-2.json").read_text())["decision"]["schema"] == "topobelief.decision/1"
+    assert json.loads((run / "leg-2.json").read_text())["decision"]["schema"] == SCHEMA
     world = read_ros_map(run / "map.yaml")
     true_places = np.array([[float(row["true_x"]), float(row["true_y"])] for row in rows])
     assert world.contains(true_places).all()
@@ -123,6 +117,23 @@ def test_bad_input_is_one_line(topobelief, tmp_path, arguments, message):
     assert message in outcome.err
     assert outcome.err.count("\n") == 1
     assert not list(tmp_path.iterdir())
+
+
+def test_paths_narrower_than_the_chassis_are_refused_before_anything_moves(topobelief, room, tmp_path):
+    room.write_text(ROOM + "robot_radius: 0.15\n")
+    outcome = topobelief(["simulate", str(room), "--out", "run"])
+    assert outcome.code == 2
+    assert "room.yaml:5: robot_radius: expected at least the radius of the chassis, 0.25 m, got 0.15" in outcome.err
+    assert outcome.err.count("\n") == 1
+    assert not (tmp_path / "run").exists()
+
+
+def test_paths_close_by_walls_are_warned_of(topobelief, room):
+    room.write_text(ROOM.replace("[6.5, 1.5], ", "") + "robot_radius: 0.3\n")
+    outcome = topobelief(["simulate", str(room), "--no-pictures", "--out", "run"])
+    assert outcome.code == 0
+    assert outcome.err.startswith("topobelief: robot_radius 0.3 m leaves 0.05 m beside the chassis of 0.25 m")
+    assert outcome.err.count("\n") == 1
 
 
 def test_another_run_is_not_continued(topobelief, room):

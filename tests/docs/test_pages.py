@@ -17,11 +17,10 @@ import pytest
 from scipy import stats
 
 from topobelief import errors
-from topobelief.bounds.entropy_bounds import Determinant, Family
+from topobelief.bounds.entropy_bounds import Determinant
 from topobelief.planning.decision import Decision
-from topobelief.planning.evaluation import SignatureName
-from topobelief.planning.objectives import ObjectiveName
 from topobelief.planning.planner import Proof
+from topobelief.planning.registry import BOUNDS, ENGINES, OBJECTIVES, SIGNATURES
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -107,7 +106,7 @@ def test_the_conventions_name_every_field_choice_and_error() -> None:
         "determinant",
     }
     assert {name for name in fields if f"`{name}`" not in CONVENTIONS} == set()
-    choices = [get_args(kind) for kind in (ObjectiveName, SignatureName, Family, Determinant, Proof)]
+    choices = [OBJECTIVES, SIGNATURES, BOUNDS, ENGINES, *(get_args(kind) for kind in (Determinant, Proof))]
     assert {choice for kind in choices for choice in kind if f'"{choice}"' not in CONVENTIONS} == set()
     raised = {name for name, kind in inspect.getmembers(errors, inspect.isclass) if issubclass(kind, errors.TopobeliefError)}
     assert {name for name in raised if f"`{name}`" not in CONVENTIONS} == set()

@@ -116,6 +116,8 @@ def test_a_session_is_timed_by_every_method_that_suits_its_size():
         "signature s_ST",
         "signature ŝ_VN",
         "signature and Fischer bounds",
+        "signature and anchored bounds",
+        "signature and chain bounds",
         "proven optimum",
         "exact J of all",
     ]
@@ -142,7 +144,7 @@ def test_a_method_that_fails_on_a_graph_is_reported_and_the_rest_goes_on():
     failing = Baseline("standard BSP, GTSAM, COLAMD", "log det I", "standard", math.inf, prepare)
     times = time_session(session, num_actions=2, repetitions=1, methods=[failing])
     assert times.methods[0].note == "fails: Indeterminate linear system detected while working near variable 7"
-    assert len(times.methods) == 6
+    assert len(times.methods) == 8
     assert times.gtsam is times.best_from_scratch is None
     result = run.BenchmarkResult(BenchmarkPlan(), {}, (times,))
     row = json.loads(json.dumps(result.to_dict(), allow_nan=False))["sessions"][0]["methods"][0]
@@ -155,7 +157,12 @@ def test_error_bounds_compare_the_families_on_the_same_candidates():
         closures="bursts", num_poses=80, num_actions=10, seeds=range(3), sigma_position=0.1, sigma_rotation=0.035
     )
     assert found.ratio["paper"] == 1
-    assert found.error_bound["anchored"] <= found.error_bound["fischer"] <= found.error_bound["paper"]
+    assert (
+        found.error_bound["chain"]
+        <= found.error_bound["anchored"]
+        <= found.error_bound["fischer"]
+        <= found.error_bound["paper"]
+    )
 
 
 def test_a_proof_takes_fewer_exact_values_where_the_noise_couples_less():
@@ -194,13 +201,15 @@ def test_the_result_grows_part_by_part_and_goes_into_json(tmp_path):
         bounds_size=40,
         bounds_actions=4,
         memory_sizes=(20,),
+        small=(25, 2),
     )
     results = list(run_benchmark(plan))
     counts = [len(result.sessions) + len(result.memory) + len(result.error_bounds) + len(result.proofs) for result in results]
-    assert counts == [0, 1, 2, 3, 4, 5, 11]
+    assert counts == [0, 1, 2, 3, 4, 5, 6, 15]
     document = json.loads(json.dumps(results[-1].to_dict(), allow_nan=False))
     assert document["schema"] == run.SCHEMA
     assert document["plan"]["files"] == ["drive.g2o"]
+    assert [session["num_poses"] for session in document["sessions"]] == [25, 40, 30]
     first = document["sessions"][0]["methods"]
     assert {row["times_faster_than_gtsam"] for row in first if "GTSAM" in row["name"]} >= {1.0}
 

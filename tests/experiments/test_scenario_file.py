@@ -45,6 +45,9 @@ def test_all_that_a_file_says_is_taken(folder):
 def test_what_a_file_leaves_out_has_defaults(folder):
     scenario = scenario_of(write(folder, "map: walls.csv\nstart: [1, 1]\ngoals: [[9, 9]]\n"))
     assert (scenario.start[2], scenario.rule.max_detour, scenario.goals[0].num_paths) == (0.0, 1.3, 20)
+    assert scenario.rule.robot_radius == pytest.approx(0.35)
+    large = scenario_of(write(folder, "map: walls.csv\nstart: [1, 1]\ngoals: [[9, 9]]\nrobot: {radius: 0.5}\n"))
+    assert large.rule.robot_radius == pytest.approx(0.6)
 
 
 @pytest.mark.parametrize(
@@ -59,6 +62,10 @@ def test_what_a_file_leaves_out_has_defaults(folder):
         (("max_range", "range"), r":6: lidar.range: expected 'rate'|:6: lidar.range: expected"),
         (("180", "2"), r":6: lidar: expected settings in their ranges, got expected num_beams"),
         (("0.02", "-1"), r":7: robot: expected settings in their ranges"),
+        (
+            ("none", "none\nrobot_radius: 0.2"),
+            r":6: robot_radius: expected at least the radius of the chassis, 0.25 m, got 0.2",
+        ),
         (("[9, 9]", "[5, 5]"), r"got expected room for a robot .* at the goal 1 \(5, 5\)"),
         (("candidates", "candidate"), r"expected 'candidates', got the unknown key 'candidate'"),
     ],

@@ -6,7 +6,7 @@ from hypothesis import given
 
 from graphs import sessions
 from topobelief.errors import InvalidActionError
-from topobelief.graph.action import Action, check_actions, posterior
+from topobelief.graph.action import Action, check_actions, driven_lengths, posterior
 from topobelief.graph.pose_graph import PoseGraph
 
 EYE = np.eye(3)
@@ -18,6 +18,22 @@ SPATIAL = PoseGraph([[0, 0, 0, 0, 0, 0, 1], [1, 0, 0, 0, 0, 0, 1]], [(0, 1)], No
 
 def chain(length):
     return [[3 + step, 0, 0] for step in range(length)]
+
+
+def test_a_length_is_what_the_action_says_or_runs_along_its_new_poses():
+    """From the old pose that the first new one is joined to; a later one may hang elsewhere."""
+    from_the_last = Action([[2, 1, 0], [5, 5, 0]], [(2, 3), (3, 4), (4, 0)], EYE)
+    from_the_first = Action([[0, 3, 0]], [(3, 0), (3, 2)], EYE)
+    loose_at_first = Action([[9, 9, 0], [9, 8, 0]], [(3, 4), (4, 2)], EYE)
+    stay = Action(np.zeros((0, 3)), [(0, 2)], EYE)
+    said = Action([[2, 1, 0]], [(2, 3)], EYE, length=7.5)
+    assert driven_lengths(PRIOR, [from_the_last, from_the_first, loose_at_first, stay, said]) == [6, 3, 1, 0, 7.5]
+
+
+@pytest.mark.parametrize("length", [-1.0, np.inf, np.nan])
+def test_a_length_that_is_none_is_refused(length):
+    with pytest.raises(InvalidActionError, match="expected a length of at least 0 m"):
+        Action([[2, 1, 0]], [(2, 3)], EYE, length=length)
 
 
 @given(sessions())
@@ -176,3 +192,11 @@ def test_actions_copy_their_arrays():
     assert (action.poses.tolist(), action.edges.tolist()) == ([[3, 0, 0]], [[2, 3]])
     with pytest.raises(AttributeError):
         action.cost = 3.0
+
+
+def test_new_poses_get_ids_after_the_largest_or_where_there_is_room():
+    """Ids end at 2^63 - 1; from there on new poses take the smallest ones that are free."""
+    for ids, expected in (([5, 7], [8, 9]), ([1, 2**63 - 4], [2**63 - 3, 2**63 - 2]), ([1, 2**63 - 1], [0, 2])):
+        graph = PoseGraph([[0, 0, 0], [1, 0, 0]], [(0, 1)], None, np.eye(3), ids=ids)
+        action = Action([[2, 0, 0], [3, 0, 0]], [(1, 2), (2, 3)], np.eye(3))
+        assert posterior(graph, action).ids.tolist() == [*ids, *expected]

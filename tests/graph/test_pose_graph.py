@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 
 from graphs import pose_graphs
-from topobelief.errors import DisconnectedGraphError, InvalidGraphError, TopobeliefError
+from topobelief.errors import DisconnectedGraphError, InvalidGraphError, InvalidInputError, TopobeliefError
 from topobelief.graph.pose_graph import PoseGraph
 
 EYE = np.eye(3)
@@ -142,6 +142,12 @@ def test_ids_are_one_each(ids, message):
         PoseGraph(LINE, CHAIN, None, EYE, ids=ids)
 
 
+def test_ids_beyond_64_bits_are_refused_not_wrapped():
+    assert PoseGraph(LINE, CHAIN, None, EYE, ids=[0, 1, 2**63 - 1]).ids.tolist() == [0, 1, 2**63 - 1]
+    with pytest.raises(InvalidInputError, match=r"expected ids below 2\^63, got 9223372036854775808"):
+        PoseGraph(LINE, CHAIN, None, EYE, ids=np.array([0, 1, 2**63], dtype=np.uint64))
+
+
 def test_fixed_poses_exist():
     with pytest.raises(InvalidGraphError, match="expected fixed poses from 0 to 2, got 3"):
         PoseGraph(LINE, CHAIN, None, EYE, fixed=(3,))
@@ -164,3 +170,28 @@ def test_the_last_digit_of_an_asymmetric_matrix_does_not_matter_twice():
     given_, transposed = (PoseGraph(LINE, CHAIN, None, matrix).information for matrix in (omega, omega.T))
     assert np.array_equal(given_, given_.transpose(0, 2, 1))
     assert np.array_equal(given_, transposed)
+
+
+X = ord("x") << 56
+
+
+@pytest.mark.parametrize(
+    ("ids", "edges", "end"),
+    [
+        ([0, 1, 2, 3], [(0, 1), (2, 1), (2, 3), (0, 3)], 3),
+        ([10, 20, 30, 45], [(0, 1), (1, 2), (2, 3)], 3),
+        ([0, 1, 2, 1007], [(0, 1), (1, 2), (2, 3), (0, 3)], 2),
+        ([3, X, X + 1, X + 2], [(0, 1), (1, 2), (2, 3)], 3),
+        ([0, 1, 2, 3], [(0, 1), (2, 3), (0, 3)], 1),
+        ([0, 1, 2, 3], [(0, 2), (1, 3), (0, 3)], None),
+    ],
+    ids=["loop", "gaps", "tag", "symbols after a tag", "broken", "no odometry"],
+)
+def test_the_robot_is_where_odometry_ends(ids, edges, end):
+    """The chain follows edges from each pose to the next, and stops at a gap or at an id that is far from all others."""
+    poses = [[k, 0, 0] for k in range(4)]
+    assert PoseGraph(poses, edges, None, EYE, ids=ids).odometry_end == end
+
+
+def test_a_single_pose_is_where_the_robot_is():
+    assert PoseGraph([[0, 0, 0]], [], None, EYE).odometry_end == 0

@@ -36,6 +36,15 @@ def test_content_that_is_no_text_is_refused(content: bytes, message: str, tmp_pa
     assert caught.value.line is None
 
 
+def test_bytes_of_other_encodings_may_be_let_through(tmp_path: Path):
+    path = tmp_path / "graph.g2o"
+    path.write_bytes("# Größe\nFIX 0\n".encode("latin-1"))
+    assert read_text(path, any_encoding=True) == "# Gr\ufffd\ufffde\nFIX 0\n"
+    path.write_bytes(b"\xe4\0")
+    with pytest.raises(FileError, match="got a binary one"):
+        read_text(path, any_encoding=True)
+
+
 def test_a_path_that_is_no_file_is_refused(tmp_path: Path):
     """Nothing, a directory, and a path through a file each say what is there instead."""
     (tmp_path / "file").write_text("text")

@@ -61,6 +61,7 @@ def test_the_office_of_the_papers_sessions() -> None:
         ("x_min,y_min,x_max,y_max\n1,1,nan,2\n", r"plan\.csv:2: "),
         ("x_min,y_min,x_max,y_max\n1,1,1,2\n", r"plan\.csv:2: .* min < max"),
         ("# bounds: 0 0 1\nx_min,y_min,x_max,y_max\n1,1,2,2\n", r"plan\.csv:1: expected bounds"),
+        ("# bounds: 0 0 9 9\n# bounds: 0 0 5 5\nx_min,y_min,x_max,y_max\n", r"plan\.csv:2: expected bounds once"),
         ("x_min,y_min,x_max,y_max\n", "for a world without walls"),
         ("# bounds: 0 0 1 1\nx_min,y_min,x_max,y_max\n-1,-1,2,2\n", r"plan\.csv: expected a world with free space"),
     ],
@@ -80,12 +81,16 @@ class TestBySuffix:
         path = write(tmp_path, PLAN)
         assert read_world(path).free.equals(read_walls(path).free)
         assert read_world(path.rename(path.with_suffix(".CSV"))).bounds == (1, 1, 4.5, 4)
-        assert read_world(map_file("depot.yaml")).bounds[2] == pytest.approx(30.2)
+        assert read_world(map_file("tb3_sandbox.yaml")).bounds[2] == pytest.approx(9.2)
 
     @pytest.mark.parametrize("name", ["map.pgm", "map"])
     def test_anything_else_is_refused(self, tmp_path: Path, name: str) -> None:
         with pytest.raises(FileError, match=r"ends in \.yaml, \.yml \(ROS map\) or \.csv"):
             read_world(tmp_path / name)
+
+    def test_an_image_leads_to_its_yaml_file(self, tmp_path: Path) -> None:
+        with pytest.raises(FileError, match=r"got \.png; name the YAML file that belongs to the image"):
+            read_world(tmp_path / "map.png")
 
     def test_a_missing_file_is_named(self, tmp_path: Path) -> None:
         for suffix in ("csv", "yaml", "yml"):

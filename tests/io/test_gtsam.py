@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+from pathlib import Path
+
 import gtsam
 import numpy as np
 import pytest
@@ -10,7 +13,9 @@ from hypothesis import given
 from graphs import SE2_GROUP, SE3_GROUP, pose_graphs
 from topobelief.errors import InvalidInputError
 from topobelief.graph.pose_graph import PoseGraph
+from topobelief.io.g2o import read_g2o, write_g2o
 from topobelief.io.gtsam import from_gtsam, to_gtsam
+from topobelief.symbols import node_name
 
 UNIT = gtsam.noiseModel.Unit.Create(3)
 
@@ -65,6 +70,40 @@ def test_symbols_become_ids():
     graph = from_gtsam(gtsam.NonlinearFactorGraph(), values)
     assert graph.ids.tolist() == [gtsam.symbol("x", 4)]
     assert graph.poses.tolist() == [[1, 2, 0.5]]
+
+
+def test_symbols_go_through_a_file(tmp_path: Path):
+    """What comes from GTSAM can be written and read again, ids and all."""
+    values = _planar_values()
+    for key in (gtsam.symbol("x", 0), gtsam.mrsymbol(ord("z"), ord("B"), 2**48 - 1)):
+        values.insert(key, gtsam.Pose2(2, 0, 0))
+    keys = sorted(values.keys())
+    factors = _graph_with(*(gtsam.BetweenFactorPose2(*pair, gtsam.Pose2(1, 0, 0), UNIT) for pair in pairwise(keys)))
+    graph = from_gtsam(factors, values)
+    write_g2o(graph, tmp_path / "graph.g2o")
+    assert read_g2o(tmp_path / "graph.g2o").ids.tolist() == keys
+    assert node_name(keys[-1]) == "zB281474976710655"
+
+
+def test_slots_of_removed_factors_are_skipped():
+    factors = _graph_with(*(gtsam.BetweenFactorPose2(0, 1, gtsam.Pose2(x, 0, 0), UNIT) for x in range(3)))
+    factors.remove(1)
+    assert from_gtsam(factors, _planar_values()).measurements[:, 0].tolist() == [0, 2]
+
+
+def test_arguments_of_other_types_are_refused():
+    factors, values = _graph_with(), _planar_values()
+    with pytest.raises(InvalidInputError, match=r"got \(Values, NonlinearFactorGraph\); swap the arguments"):
+        from_gtsam(values, factors)
+    with pytest.raises(InvalidInputError, match=r"expected \(NonlinearFactorGraph, Values\), got \(NoneType, Values\)$"):
+        from_gtsam(None, values)
+
+
+def test_keys_too_large_for_ids_are_refused():
+    values = gtsam.Values()
+    values.insert(2**63, gtsam.Pose2())
+    with pytest.raises(InvalidInputError, match=r"expected keys below 2\^63, got 9223372036854775808"):
+        from_gtsam(_graph_with(), values)
 
 
 def _graph_with(*factors: object) -> gtsam.NonlinearFactorGraph:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from data_files import data_file
-from topobelief.errors import FileError
+from topobelief.errors import FileError, ReadingWarning
 from topobelief.io.g2o import read_g2o
 from topobelief.io.toro import read_toro
 
@@ -56,9 +56,9 @@ def test_fix_lines_comments_and_missing_poses_work_as_in_g2o(filed):
         ("EDGE2 0 1 1 2 0.5 1 2 1 1 0 0", "expected a positive definite information matrix for EDGE2, got eigenvalues from -1"),
         ("VERTEX3 5 0 0 0 0 0 0", "got VERTEX3: 3D TORO files are not supported"),
         ("EDGE3 0 1 0 0 0 0 0 0", "got EDGE3: 3D TORO files are not supported"),
-        ("EQUIV 0 1", "got EQUIV: merging two poses into one is not supported"),
-        ("BR 0 7 1 2 3 4", "got BR: landmarks are not supported yet"),
-        ("EDGE_SE2 0 1 1 2 0.5 1 0 0 1 0 1", "expected VERTEX2, EDGE2 or FIX, got the unknown tag EDGE_SE2"),
+        ("EQUIV 0 1", "got pairs of poses that are to be merged into one (EQUIV on line 3)"),
+        ("BR 0 7 1 2 3 4", "got landmarks (BR on line 3)"),
+        ("EDGE_SE2 0 1 1 2 0.5 1 0 0 1 0 1", "expected VERTEX2, EDGE2 or FIX, got EDGE_SE2: it belongs to the format g2o"),
     ],
 )
 def test_a_bad_line_is_named(line: str, message: str, filed):
@@ -67,3 +67,23 @@ def test_a_bad_line_is_named(line: str, message: str, filed):
         read_toro(path)
     assert str(caught.value).startswith(f"{path}:3: ")
     assert message in str(caught.value)
+
+
+ISAM = "EDGE2 0 1 1 2 0.5 100 1 2 90 3 400\n"
+
+
+def test_the_order_of_isam_is_an_option_that_the_refusal_names(filed):
+    """Entries row by row give an indefinite matrix in TORO's order; dropping indefinite edges does not hide that."""
+    path = filed(PAIR + ISAM)
+    for options in ({}, {"drop": "indefinite"}):
+        with pytest.raises(FileError, match=r':3: .*in the other order of EDGE2 all edges have one: .*edge2_order="isam"'):
+            read_toro(path, **options)
+    assert read_toro(path, edge2_order="isam").information.tolist() == [[[100, 1, 2], [1, 90, 3], [2, 3, 400]]]
+    with pytest.raises(FileError, match='edge2_order="toro"'):
+        read_toro(filed(PAIR + "EDGE2 0 1 1 2 0.5 100 1 90 400 2 3\n"), edge2_order="isam")
+
+
+def test_equiv_lines_can_be_ignored(filed):
+    with pytest.warns(ReadingWarning, match=r"dropped pairs of poses that are to be merged into one: EQUIV on line 4"):
+        graph = read_toro(filed(PAIR + "EDGE2 0 1 1 2 0.5 1 0 1 1 0 0\nEQUIV 0 1\n"), drop="equiv")
+    assert graph.num_edges == 1

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from graphs import NOISES, SE2_GROUP, SE3_GROUP, Noise, random_action, random_pose_graph, sessions
 from references import log_det_exact, log_det_reference
+from topobelief.forms.action_batch import ActionBatch
 from topobelief.graph.action import posterior
 from topobelief.graph.fisher import fisher_rows
 from topobelief.graph.pose_graph import PoseGraph
@@ -17,7 +18,6 @@ from topobelief.linalg.elimination_paths import FormFactor
 from topobelief.linalg.elimination_tree import EliminationTree
 from topobelief.linalg.extensions import Extensions
 from topobelief.linalg.increments import diagonal_increments, log_det_increments
-from topobelief.planning.action_batch import ActionBatch
 
 PARTS = ("joint", "positions", "rotations", "rotations_given_positions")
 seeds = st.integers(0, 2**32 - 1)
@@ -78,7 +78,9 @@ def test_parts_of_the_closures_are_blocks_of_the_covariance_that_they_see(sessio
     graph, held = session.graph, int(np.random.default_rng(seed).integers(session.graph.num_poses))
     k = graph.group.position_dim
     batch = ActionBatch(graph, session.actions)
-    found = log_det_increments(factored(graph, held, "joint"), batch.extensions, blocks_of(batch.rows, "joint"), split=k)
+    found = log_det_increments(
+        factored(graph, held, "joint"), batch.extensions, blocks_of(batch.rows, "joint"), wanted="parts", first_rows=k
+    )
     starts = batch.extensions.edge_start
     for n, action in enumerate(session.actions):
         planted = np.r_[np.ones(graph.num_edges, bool), batch.extensions.planted[starts[n] : starts[n + 1]]]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from graphs import connected_topologies
 from references import laplacian_log_det_exact
-from topobelief.linalg import EdgeForm, LogDet, LogDetSolver, laplacian_form
+from topobelief.linalg import EdgeForm, Estimate, LogDetSolver, laplacian_form
 from topobelief.linalg.block_pattern import BlockPattern
 
 seeds = st.integers(0, 2**32 - 1)
@@ -130,11 +130,11 @@ def test_nothing_free_has_determinant_one():
     edges = np.array([(0, 1), (1, 2)])
     form = laplacian_form(edges, np.ones(2))
     solver = LogDetSolver(edges, 3, np.arange(3))
-    assert solver.log_det(form) == LogDet(0.0, 0.0)
-    assert solver.hadamard(form) == LogDet(0.0, 0.0)
+    assert solver.log_det(form) == Estimate(0.0, 0.0)
+    assert solver.hadamard(form) == Estimate(0.0, 0.0)
     assert LogDetSolver(np.zeros((0, 2), dtype=int), 1, 0).log_det(
         laplacian_form(np.zeros((0, 2), dtype=int), np.zeros(0))
-    ) == LogDet(0.0, 0.0)
+    ) == Estimate(0.0, 0.0)
 
 
 @pytest.mark.parametrize("num_nodes", [3, 1500], ids=["small", "too large for QR"])
@@ -172,10 +172,10 @@ def test_the_error_estimate_covers_badly_scaled_laplacians(decades, topology, da
 
 
 def test_log_dets_add_and_scale_with_their_errors():
-    a, b = LogDet(3.0, 0.1), LogDet(1.0, 0.2)
-    assert a + b == LogDet(4.0, pytest.approx(0.3))
-    assert a - b == LogDet(2.0, pytest.approx(0.3))
-    assert -0.5 * a == LogDet(-1.5, 0.05)
+    a, b = Estimate(3.0, 0.1), Estimate(1.0, 0.2)
+    assert a + b == Estimate(4.0, pytest.approx(0.3))
+    assert a - b == Estimate(2.0, pytest.approx(0.3))
+    assert -0.5 * a == Estimate(-1.5, 0.05)
     assert a.plus(-2.0).value == 1.0
     assert 0.1 < a.plus(-2.0).error < 0.1 + 1e-14
 

@@ -88,7 +88,38 @@ def test_a_perfect_signature():
     quality = decision_quality(J, -J)
     assert (quality.error, quality.gamma, quality.action_consistent, quality.order_consistent) == (0, 0, True, True)
     assert (quality.spearman, quality.kendall) == (1, 1)
-    assert quality.pearson == pytest.approx(1)
+    assert quality.pearson == 1
+
+
+@given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=2, max_size=40))
+def test_a_perfect_order_correlates_with_exactly_1(J):
+    """And the opposite one with exactly -1, whatever the numbers are."""
+    J = np.array(J)
+    perfect, opposite = decision_quality(J, -J), decision_quality(J, J)
+    if len(np.unique(J)) == 1:
+        assert math.isnan(perfect.spearman)
+        return
+    assert (perfect.error, perfect.gamma, perfect.order_consistent) == (0, 0, True)
+    assert (perfect.spearman, perfect.kendall, perfect.pearson) == (1, 1, 1)
+    assert (opposite.spearman, opposite.kendall, opposite.pearson) == (-1, -1, pytest.approx(-1))
+    assert rank_correlation(J, J) == 1
+
+
+@pytest.mark.parametrize("unit", [5e-324, 1e-320, 1e-300, 1e300, 3e307])
+def test_numbers_near_the_ends_of_double_precision_neither_overflow_nor_vanish(unit):
+    """Warnings are errors in these tests."""
+    J, s = np.array([5.0, 1.0, -5.0, 2.0]), np.array([3.0, 2.0, 1.0, 0.0])
+    usual, extreme = decision_quality(J, s), decision_quality(np.float64(unit) * J, np.float64(unit) * s)
+    assert extreme.error == (np.float64(unit) * 10 if unit < 1e307 else math.inf)  # 3e308 is no double
+    assert (usual.error, usual.gamma) == (10, 10)
+    assert (extreme.action_consistent, extreme.order_consistent) == (False, False)
+    assert (extreme.spearman, extreme.kendall) == (usual.spearman, usual.kendall)
+    assert extreme.pearson == pytest.approx(usual.pearson)
+
+
+def test_a_gamma_that_is_a_double_is_found_though_the_difference_is_none():
+    quality = decision_quality([-1.6e308, 1.6e308, -1.5e308], [3.0, 2.0, 1.0])
+    assert (quality.error, quality.gamma) == (0, pytest.approx(1.55e308))
 
 
 def test_a_swap_among_losers_costs_half_of_it_and_one_with_the_winner_the_whole():

@@ -31,18 +31,17 @@ def session(seed: int, *, num_actions: int = 40) -> tuple[PoseGraph, list[Action
     return PoseGraph(poses, edges, None, OMEGA), actions
 
 
-def decided(monkeypatch, work: float, graph: PoseGraph, actions: list[Action], proof: str, **choices: str) -> Decision:
-    monkeypatch.setattr(planner_module, "_INCREMENTAL_WORK", work)
-    return Planner(graph, **choices).decide(actions, proof=proof)
+def decided(engine: str, graph: PoseGraph, actions: list[Action], proof: str, **choices: str) -> Decision:
+    return Planner(graph, engine=engine, **choices).decide(actions, proof=proof)
 
 
 @pytest.mark.parametrize("objective", ["joint", "map", "per_pose"])
 @pytest.mark.parametrize("bounds", ["fischer", "paper"])
 @pytest.mark.parametrize("proof", ["bounded", "optimal"])
-def test_both_engines_decide_alike(monkeypatch, objective, bounds, proof):
+def test_both_engines_decide_alike(objective, bounds, proof):
     graph, actions = session(1)
-    scratch = decided(monkeypatch, np.inf, graph, actions, proof, objective=objective, bounds=bounds)
-    increments = decided(monkeypatch, 0, graph, actions, proof, objective=objective, bounds=bounds)
+    scratch = decided("scratch", graph, actions, proof, objective=objective, bounds=bounds)
+    increments = decided("incremental", graph, actions, proof, objective=objective, bounds=bounds)
     assert increments.best == scratch.best
     assert increments.ranking.tolist() == scratch.ranking.tolist()
     np.testing.assert_allclose(increments.signatures, scratch.signatures, rtol=1e-9)
@@ -57,11 +56,10 @@ def test_both_engines_decide_alike(monkeypatch, objective, bounds, proof):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_proof_by_increments_finds_the_least_value(monkeypatch, seed):
+def test_a_proof_by_increments_finds_the_least_value(seed):
     graph, actions = session(seed)
-    monkeypatch.setattr(planner_module, "_INCREMENTAL_WORK", 0)
-    for bounds in ("fischer", "anchored"):
-        planner = Planner(graph, bounds=bounds)
+    for bounds in ("fischer", "anchored", "chain"):
+        planner = Planner(graph, bounds=bounds, engine="incremental")
         values = planner.entropies(actions) + [action.cost for action in actions]
         assert planner.decide(actions, proof="optimal").best == int(np.argmin(values))
 
@@ -87,50 +85,49 @@ def flat(sigma_rotation: float) -> tuple[PoseGraph, list[Action]]:
     ]
 
 
-def test_the_family_is_chosen_by_what_fischers_bounds_leave_open(monkeypatch):
+def test_the_family_is_chosen_by_what_fischers_bounds_leave_open():
     chosen = {}
     for sigma in (1e-3, 0.3):
         graph, actions = flat(sigma)
-        decision = decided(monkeypatch, 0, graph, actions, "optimal", bounds="auto")
-        fischer = decided(monkeypatch, 0, graph, actions, "bounded", bounds="fischer")
+        decision = decided("incremental", graph, actions, "optimal", bounds="auto")
+        fischer = decided("incremental", graph, actions, "bounded", bounds="fischer")
         chosen[sigma] = decision.bounds, len(fischer.survivors) / len(actions)
-        assert decision.best == decided(monkeypatch, 0, graph, actions, "optimal", bounds="fischer").best
+        assert decision.best == decided("incremental", graph, actions, "optimal", bounds="fischer").best
         assert decision.proven_optimal
     assert chosen[1e-3][0] == "fischer"
     assert chosen[1e-3][1] < 0.5
-    assert chosen[0.3][0] == "anchored"
+    assert chosen[0.3][0] == "chain"
     assert chosen[0.3][1] > 0.5
 
 
-def test_each_decision_chooses_its_family_anew(monkeypatch):
-    monkeypatch.setattr(planner_module, "_INCREMENTAL_WORK", 0)
+def test_each_decision_chooses_its_family_anew():
     graph, actions = flat(0.3)
-    planner = Planner(graph, bounds="auto")
-    assert planner.decide(actions).bounds == "anchored"
+    planner = Planner(graph, bounds="auto", engine="incremental")
+    assert planner.decide(actions).bounds == "chain"
     ruled_out = [Action(action.poses, action.edges, action.information, cost=1e3 * n) for n, action in enumerate(actions)]
     assert planner.decide(ruled_out).bounds == "fischer"
-    assert planner.decide(actions).bounds == "anchored"
+    assert planner.decide(actions).bounds == "chain"
 
 
-def test_few_actions_take_fischers_bounds_without_a_trial():
+def test_from_scratch_fischers_bounds_are_taken_without_a_trial():
     graph, actions = flat(0.3)
-    assert Planner(graph, bounds="auto").decide(actions).bounds == "fischer"
+    assert Planner(graph, bounds="auto", engine="scratch").decide(actions).bounds == "fischer"
 
 
-def test_an_action_beyond_double_precision_is_named_by_increments_too(monkeypatch):
-    monkeypatch.setattr(planner_module, "_INCREMENTAL_WORK", 0)
+def test_an_action_beyond_double_precision_is_named_by_increments_too():
     graph, actions = session(4, num_actions=3)
     n = graph.num_poses
     far = [[1e14, 0, 0], [2e14, 0, 0]]
     hopeless = Action(far, [(n - 1, n), (n, n + 1), (n + 1, n - 1), (n + 1, 3)], OMEGA, label="hopeless")
     with pytest.raises(IllConditionedError, match=r"action 3 \('hopeless'\)"):
-        Planner(graph).entropies([*actions, hopeless])
+        Planner(graph, engine="incremental").entropies([*actions, hopeless])
 
 
-def test_without_numba_small_work_goes_on_and_anchored_bounds_say_what_to_install(monkeypatch):
+def test_without_numba_everything_is_evaluated_from_scratch(monkeypatch):
     monkeypatch.setattr(planner_module, "_has_kernels", lambda: False)
-    monkeypatch.setattr(planner_module, "_INCREMENTAL_WORK", 0)
     graph, actions = session(5, num_actions=3)
     assert Planner(graph).decide(actions).num_actions == 3
+    anchored = Planner(graph, bounds="anchored").decide(actions)
+    np.testing.assert_allclose(anchored.upper, anchored.lower, rtol=1e-9)
     with pytest.raises(InvalidInputError, match=r"pip install 'topobelief\[fast\]'"):
-        Planner(graph, bounds="anchored")
+        Planner(graph, engine="incremental")

@@ -14,16 +14,10 @@ from topobelief.experiments.benchmark.sessions import candidate_paths, city_driv
 from topobelief.graph.action import posterior
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg import block_cholesky, elimination_paths
-from topobelief.planning import planner as planner_module
 from topobelief.planning.planner import Planner
 
 OBJECTIVES = ("joint", "map", "per_pose")
-FAMILIES = ("fischer", "anchored")
-
-
-@pytest.fixture(autouse=True)
-def incremental(monkeypatch):
-    monkeypatch.setattr(planner_module, "_INCREMENTAL_WORK", 0)
+FAMILIES = ("fischer", "anchored", "chain")
 
 
 def assert_same_decisions(extended: Planner, new: Planner, actions, *, tolerance=1e-9) -> None:
@@ -42,7 +36,7 @@ def moved(graph: PoseGraph, rng: np.random.Generator) -> PoseGraph:
 
 @given(sessions(log_ratio=(-2.0, 1.0)), st.sampled_from(OBJECTIVES), st.sampled_from(FAMILIES), st.booleans())
 def test_random_graphs_that_grow(session, objective, family, poses_move):
-    planner = Planner(session.graph, objective=objective, bounds=family)
+    first = planner = Planner(session.graph, engine="incremental", objective=objective, bounds=family)
     graph, rng = session.graph, np.random.default_rng(0)
     planner.decide(session.actions)
     noise = Noise(graph.group, "full", position_weight=10.0, ratio=1.0, length=1.0, spread=1.0)
@@ -50,8 +44,11 @@ def test_random_graphs_that_grow(session, objective, family, poses_move):
         graph = posterior(graph, random_action(rng, graph, noise))
         graph = moved(graph, rng) if poses_move else graph
         actions = [random_action(rng, graph, noise) for _ in range(3)]
-        new = Planner(graph, objective=objective, bounds=family)
-        assert_same_decisions(planner.extend(graph), new, actions, tolerance=1e-7)
+        new = Planner(graph, engine="incremental", objective=objective, bounds=family)
+        planner = planner.extended(graph)
+        assert_same_decisions(planner, new, actions, tolerance=1e-7)
+    new = Planner(session.graph, engine="incremental", objective=objective, bounds=family)
+    assert_same_decisions(first, new, session.actions)  # the planner that was extended still works
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -59,13 +56,13 @@ def test_random_graphs_that_grow(session, objective, family, poses_move):
 @pytest.mark.parametrize("anchor", [None, 17])
 def test_a_city_that_grows(family, poses_move, anchor):
     graph, rng = city_drive(800, block_isotropic(0.1, 0.035), rng=np.random.default_rng(3)), np.random.default_rng(4)
-    planner = Planner(graph, bounds=family, anchor=anchor)
+    planner = Planner(graph, engine="incremental", bounds=family, anchor=anchor)
     for _ in range(4):
         actions = candidate_paths(graph, 5, num_new_poses=30, num_closures=6, rng=rng)
-        assert_same_decisions(planner, Planner(graph, bounds=family, anchor=anchor), actions)
+        assert_same_decisions(planner, Planner(graph, engine="incremental", bounds=family, anchor=anchor), actions)
         graph = posterior(graph, actions[0])
         graph = moved(graph, rng) if poses_move else graph
-        assert planner.extend(graph) is planner
+        planner = planner.extended(graph)
         assert planner.graph is graph
 
 
@@ -73,12 +70,12 @@ def test_three_dimensions():
     rng = np.random.default_rng(5)
     noise = Noise(SE3_GROUP, "full", position_weight=100.0, ratio=0.5, length=1.0, spread=1.0)
     graph = random_pose_graph(rng, noise, 40, 15)
-    planner = Planner(graph, bounds="anchored")
+    planner = Planner(graph, engine="incremental", bounds="anchored")
     for _ in range(3):
         actions = [random_action(rng, graph, noise) for _ in range(4)]
-        assert_same_decisions(planner, Planner(graph, bounds="anchored"), actions)
+        assert_same_decisions(planner, Planner(graph, engine="incremental", bounds="anchored"), actions)
         graph = posterior(graph, actions[0])
-        planner.extend(graph)
+        planner = planner.extended(graph)
 
 
 def test_graphs_that_are_no_extension_start_anew():
@@ -98,7 +95,7 @@ def test_graphs_that_are_no_extension_start_anew():
     planner.decide(candidate_paths(graph, 3, num_new_poses=10, num_closures=3, rng=rng))
     for other in others:
         actions = candidate_paths(other, 3, num_new_poses=10, num_closures=3, rng=rng)
-        assert_same_decisions(planner.extend(other), Planner(other), actions)
+        assert_same_decisions(planner.extended(other), Planner(other, engine="incremental"), actions)
 
 
 def test_a_graph_that_cannot_be_planned_on_leaves_the_planner_as_it_was():
@@ -106,7 +103,7 @@ def test_a_graph_that_cannot_be_planned_on_leaves_the_planner_as_it_was():
     planner = Planner(graph)
     loose = PoseGraph(np.concatenate([graph.poses, [[0, 0, 0]]]), graph.edges, graph.measurements, graph.information)
     with pytest.raises(DisconnectedGraphError):
-        planner.extend(loose)
+        planner.extended(loose)
     actions = candidate_paths(graph, 2, num_new_poses=5, num_closures=2, rng=np.random.default_rng(0))
     assert planner.graph is graph
     assert_same_decisions(planner, Planner(graph), actions)
@@ -122,13 +119,13 @@ def test_columns_that_have_not_changed_are_copied(monkeypatch, poses_move, least
 
     graph = city_drive(3000, block_isotropic(0.1, 0.035), rng=np.random.default_rng(9))
     actions = candidate_paths(graph, 3, num_new_poses=20, num_closures=4, rng=np.random.default_rng(1))
-    planner = Planner(graph, bounds="anchored")
+    planner = Planner(graph, engine="incremental", bounds="anchored")
     planner.decide(actions)
     grown = posterior(graph, actions[0])
     grown = moved(grown, np.random.default_rng(2)) if poses_move else grown
     monkeypatch.setattr(elimination_paths, "factorize", spy)
     new_actions = candidate_paths(grown, 3, num_new_poses=20, num_closures=4, rng=np.random.default_rng(1))
-    planner.extend(grown).decide(new_actions)
+    planner.extended(grown).decide(new_actions)
     by_size = dict(shares)
     assert by_size[1] > 0.75  # spanning trees do not know where poses are
     assert by_size[3] >= least

@@ -1,6 +1,8 @@
 """Algorithm 1 and its proof, field by field, against exhaustive evaluation."""
 
+import copy
 import math
+import pickle
 from itertools import pairwise
 
 import numpy as np
@@ -51,6 +53,11 @@ def assert_ranked(decision, costs):
     assert (along >= np.maximum.accumulate(along[::-1])[::-1] - rounding).all()
     for earlier, later in pairwise(decision.ranking):
         assert score[earlier] != score[later] or earlier < later
+
+
+def contents(action):
+    """What equal actions have in common."""
+    return tuple(array.tobytes() for array in (action.poses, action.edges, action.information))
 
 
 def exhaustive(session, objective):
@@ -176,7 +183,7 @@ def test_a_proof_returns_the_best_action(session, configuration):
     assert decision.error_bound <= slack
     assert decision.best in decision.survivors
     evaluated = np.flatnonzero(~np.isnan(decision.entropies))
-    assert decision.num_evaluations == len(evaluated)
+    assert decision.num_evaluations == len({contents(session.actions[index]) for index in evaluated})
     costs = np.array([action.cost for action in session.actions])
     assert np.allclose(decision.entropies[evaluated] + costs[evaluated], J[evaluated], rtol=1e-9, atol=1e-9)
     # evaluated: both bounds are that value widened by its error
@@ -271,7 +278,7 @@ def test_an_interruption_while_bounding_certifies_nothing_yet_but_rules_out_noth
 
     ticks = iter([0.0, 0.0, 10.0, 10.0, 10.0, 10.0])
     monkeypatch.setattr(search.time, "monotonic", lambda: next(ticks))
-    decision = Planner(LINE).decide([explore, revisit, stay], proof="optimal", deadline=5.0)
+    decision = Planner(LINE, engine="scratch").decide([explore, revisit, stay], proof="optimal", deadline=5.0)
     assert np.isfinite(decision.upper).sum() == 1
     assert decision.survivors.tolist() == decision.ranking.tolist()
     assert (decision.error_bound, decision.proven_optimal, decision.num_evaluations) == (math.inf, False, 0)
@@ -279,7 +286,7 @@ def test_an_interruption_while_bounding_certifies_nothing_yet_but_rules_out_noth
 
 def test_progress_is_told_by_stage():
     told = []
-    planner = Planner(LINE)
+    planner = Planner(LINE, engine="scratch")
     planner.decide([explore, revisit], proof="optimal", on_progress=lambda *news: told.append(news))
     assert told[:2] == [("signatures", 1, 2), ("signatures", 2, 2)]
     assert {stage for stage, _, _ in told} <= {"signatures", "bounds", "evaluations"}
@@ -315,6 +322,36 @@ def test_of_identical_actions_the_cheaper_is_proven_best():
     decision = Planner(LINE).decide([dear, revisit], proof="optimal")
     assert decision.best == 1
     assert decision.entropies[1] == pytest.approx(Planner(LINE).entropies([dear])[0])
+
+
+@pytest.mark.parametrize("engine", ["scratch", "incremental"])
+@pytest.mark.parametrize("signature", SIGNATURES)
+def test_equal_actions_are_computed_once(engine, signature):
+    """Labels, costs and the way in which a noise is given do not make a difference; poses, edges and noise do."""
+    named = Action(revisit.poses, revisit.edges, [OMEGA] * 3, label="another name", cost=0.25)
+    other_noise = Action(revisit.poses, revisit.edges, [OMEGA, OMEGA, 0.999 * OMEGA])
+    other_place = Action([[4, 0.99, 0]], revisit.edges, OMEGA)
+    actions = [explore, revisit, named, other_noise, revisit, other_place]
+    planner, told = Planner(LINE, signature=signature, engine=engine), []
+    decision = planner.decide(actions, proof="optimal", on_progress=lambda *news: told.append(news))
+    assert ("signatures", 4, 4) in told
+    assert (decision.best, decision.proven_optimal) == (1, True)
+    values = planner.entropies(actions, on_progress=lambda *news: told.append(news))
+    assert told[-1] == ("evaluations", 4, 4)
+    np.testing.assert_allclose(values, [Planner(LINE).entropies([action])[0] for action in actions], rtol=1e-12)
+    for name in ("signatures", "entropies"):
+        assert len(set(getattr(decision, name)[[1, 2, 4]])) == 1
+    for bound in (decision.lower, decision.upper):
+        assert (bound[1], bound[2]) == (bound[4], bound[4] + 0.25)
+    evaluated = np.flatnonzero(~np.isnan(decision.entropies))
+    assert decision.num_evaluations == len({contents(actions[index]) for index in evaluated}) < len(evaluated)
+    limited = planner.decide(actions, proof="optimal", max_evaluations=1)
+    assert limited.num_evaluations == 1
+
+
+def test_a_margin_bounds_the_first_of_equal_actions_alone():
+    decision = Planner(LINE).decide([revisit, revisit, explore], margin=0.0)
+    assert np.isfinite(decision.upper).tolist() == [True, False, False]
 
 
 def test_cost_is_left_out_of_entropies_and_kept_in_bounds():
@@ -356,6 +393,13 @@ def test_results_are_read_only_arrays():
         array = getattr(decision, name)
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0
+
+
+def test_a_planner_goes_through_pickle_and_copies():
+    planner = Planner(LINE, objective="map", anchor=1)
+    expected = planner.decide([explore, revisit, stay], proof="optimal").to_dict()
+    for other in (pickle.loads(pickle.dumps(planner)), copy.deepcopy(planner), copy.copy(planner)):
+        assert other.decide([explore, revisit, stay], proof="optimal").to_dict() == expected
 
 
 def test_a_planner_decides_again_the_same():
@@ -462,8 +506,8 @@ def test_an_action_beyond_double_precision_is_named():
     step = Action([[1, 0, 0, 0, 0, 0, 1]], [(0, 1)], omega)
     hopeless = Action([[1e12, 0, 0, 0, 0, 0, 1], [2e12, 0, 0, 0, 0, 0, 1]], [(0, 1), (1, 2), (2, 0)], omega, label="hopeless")
     with pytest.raises(IllConditionedError):
-        Planner(prior).entropies([hopeless])
-    for call in (Planner(prior).entropies, Planner(prior).decide):
+        Planner(prior, engine="scratch").entropies([hopeless])
+    for call in (Planner(prior, engine="scratch").entropies, Planner(prior, engine="scratch").decide):
         with pytest.raises(IllConditionedError, match=r"action 1 \('hopeless'\)"):
             call([step, hopeless])
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from engines import judge
 from graphs import NOISES, SE2_GROUP, SE3_GROUP, Noise, random_action, random_pose_graph
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.planning import planner as planner_module
-from topobelief.planning.evaluation import ScratchEvaluation
+from topobelief.planning.engine import ScratchEngine
 from topobelief.planning.planner import Planner
 
 SESSIONS_A_TEST = 250
@@ -46,19 +46,18 @@ def without_closures(graph: PoseGraph, action: Action) -> Action:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_a_proven_optimum_is_one(monkeypatch, seed):
+def test_a_proven_optimum_is_one(seed):
     rng = np.random.default_rng([2026, seed])
     evaluations = possible = 0
     for number in range(SESSIONS_A_TEST):
         graph, actions = random_session(rng)
         objective = OBJECTIVES[number % 3]
-        bounds = ("fischer", "anchored", "auto")[int(rng.integers(3))]
+        bounds = ("fischer", "anchored", "auto", "chain")[int(rng.integers(4))]
         signature = "spanning_trees" if rng.random() < 0.7 else "von_neumann_approx"
-        monkeypatch.setattr(planner_module, "_INCREMENTAL_WORK", 0 if rng.random() < 0.7 else np.inf)
-        planner = Planner(graph, objective=objective, bounds=bounds, signature=signature)
+        engine = "incremental" if rng.random() < 0.7 else "scratch"
+        planner = Planner(graph, objective=objective, bounds=bounds, signature=signature, engine=engine)
         decision = planner.decide(actions, proof="optimal")
-        reference = ScratchEvaluation(graph, objective, "spanning_trees", False, "fischer", "cholesky", graph.num_poses - 1)
-        values, errors = reference.entropies(actions)
+        values, errors = judge(graph, ScratchEngine, objective=objective).entropies(actions)
         totals = values + np.array([action.cost for action in actions])
         assert decision.proven_optimal
         assert totals[decision.best] - errors[decision.best] <= np.min(totals + errors), (seed, number)

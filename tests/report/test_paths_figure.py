@@ -108,7 +108,20 @@ def test_a_single_path_without_closures_is_drawn(scene):
     decision = Planner(graph).decide(actions[1:])
     figure = draw_paths(graph, ROOM, paths[1:], actions[1:], decision, goal=(5, 8))
     assert len(segments(figure, PREDICTED_CLOSURE)) == 0
-    assert any(text.get_text() == "1 candidate path on the pose graph; right is chosen" for text in figure.texts)
+    assert any(text.get_text() == "right on the pose graph, the only candidate" for text in figure.texts)
+
+
+def test_a_start_elsewhere_is_marked_and_its_odometry_is_no_closure(scene):
+    """From pose 1 the first new pose is joined to pose 1, and what it sees of pose 4, the last, is a closure."""
+    graph = scene[0]
+    actions = [Action([(2, 4, 2), (2, 8, 1)], [(1, 5), (5, 6), (5, 4)], OMEGA, label="back")]
+    decision = Planner(graph).decide(actions)
+    path = [np.array([(2, 2), (2, 8)], float)]
+    for start, name in ((1, "start, pose 1"), ((2.0, 2.5), "start, near pose 1"), (4, "start, the graph's last pose")):
+        figure = draw_paths(graph, ROOM, path, actions, decision, goal=(2, 8), start=start)
+        assert name in {text.get_text() for text in figure.legends[0].get_texts()}
+        expected = [[[2, 4], [5, 2]]] if start != 4 else [[[2, 2], [2, 4]]]
+        assert segments(figure, PREDICTED_CLOSURE).tolist() == expected
 
 
 def test_drawing_leaves_the_settings_of_matplotlib_alone(scene):

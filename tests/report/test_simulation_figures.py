@@ -40,7 +40,7 @@ def test_a_run_shows_its_tracks(tmp_path):
     record = made_record()
     figure = draw_run(record)
     words = texts(figure)
-    assert "2 of 2 goals reached, 15 m, 8 key poses; tracks laid on the true one" in words
+    assert "2 of 2 goals reached, 15 m, 8 key poses; tracks begin at the true start" in words
     assert "physical noise, seed 3" in words
     for label in ("true track", "wheel odometry", "estimate", "loop closures (1)", "95 % of a position"):
         assert label in words
@@ -48,6 +48,16 @@ def test_a_run_shows_its_tracks(tmp_path):
     assert "not reached" not in words
     save_figure(figure, tmp_path / "run.png")
     assert (tmp_path / "run.png").stat().st_size > 20_000
+
+
+def test_errors_begin_at_zero():
+    """The start is known to the wheels as well as to the estimate."""
+    errors = draw_run(made_record()).axes[-1]
+    curves = [line.get_ydata() for line in errors.lines if len(line.get_ydata()) == 8]
+    assert len(curves) == 2
+    for curve in curves:
+        assert curve[0] == pytest.approx(0, abs=1e-9)
+        assert curve[-1] > 0.01
 
 
 def test_injected_noise_shows_what_it_was_added_to():
@@ -109,4 +119,8 @@ def test_a_run_in_words():
     table = shown(metrics_table(record))
     assert f"{metrics['error_slam']:.3f} m on all poses" in table
     assert "0.036% of the time driven" in table
-    assert leg_line(record.legs[1]) == "goal 2: path 1 of 2 (10.0 m); arrived after 10.2 m in 20 s with 1 loop closures"
+    assert leg_line(record.legs[1]) == (
+        "goal 2: path 0 of 2 (10.0 m); arrived after 10.2 m in 20 s with 1 loop closures, "
+        "0.21 m from the goal (0.11 m as the robot believes)"
+    )
+    assert "at most 0.21 m, as the robot believes 0.12 m" in table

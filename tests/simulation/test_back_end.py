@@ -110,7 +110,7 @@ def test_the_graph_is_whole_at_any_time_and_the_first_pose_stays() -> None:
     graph = back_end.pose_graph()
     assert isinstance(graph, PoseGraph)
     np.testing.assert_allclose(graph.poses, [start, SE2_GROUP.compose(start, np.array([1.0, 0.0, 0.1]))], atol=1e-9)
-    np.testing.assert_allclose(back_end.last_covariance, np.diag(SIGMAS**2), rtol=0.1, atol=1e-6)
+    np.testing.assert_allclose(back_end.newest_covariance, np.diag(SIGMAS**2), rtol=0.1, atol=1e-6)
 
 
 def test_the_same_factors_give_the_same_bits() -> None:

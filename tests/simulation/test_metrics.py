@@ -12,6 +12,7 @@ from topobelief.simulation.metrics import (
     aligned,
     alignment,
     chained,
+    from_start,
     position_covariances,
     position_errors,
     trajectory_error,
@@ -55,6 +56,18 @@ def test_the_first_poses_are_aligned_by_themselves(truth):
     assert trajectory_error(estimate, truth, num_poses=20) < 1e-12
     assert trajectory_error(estimate, truth) > 1.0
     assert position_errors(estimate, truth).shape == (41,)
+
+
+def test_from_the_start_on_errors_grow_from_nothing(truth):
+    """Bent at one joint: before it there is no error, and after it there is."""
+    estimate = truth.copy()
+    estimate[20:] = SE2_GROUP.compose(
+        truth[20], SE2_GROUP.compose(np.array([0.0, 0.0, 0.1]), SE2_GROUP.between(truth[20], truth[20:]))
+    )
+    moved = SE2_GROUP.compose(np.broadcast_to([5.0, -3.0, 2.5], truth.shape), estimate)
+    errors = np.linalg.norm(from_start(moved, truth)[:, :2] - truth[:, :2], axis=1)
+    np.testing.assert_allclose(errors[:21], 0, atol=1e-9)
+    assert errors[25] > 0.1
 
 
 def test_counts_must_agree(truth):

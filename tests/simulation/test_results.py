@@ -83,7 +83,7 @@ def test_another_run_is_not_taken_for_this_one(record, folder, changes, scenario
     [
         ("run.json", "{}", "expected a run of schema"),
         ("run.json", "[1", "expected a run as"),
-        ("run.json", '{"schema": "topobelief.run/1"}', "expected a run as"),
+        ("run.json", '{"schema": "topobelief.run/2"}', "expected a run as"),
         ("sensors.npz", "nothing", "sensors.npz: expected the sensor data of a run"),
     ],
 )

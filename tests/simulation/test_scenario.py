@@ -10,7 +10,7 @@ from topobelief.candidates.diverse_paths import diverse_paths
 from topobelief.candidates.polyline import path_length, stations
 from topobelief.candidates.roadmap import build_roadmap
 from topobelief.errors import InvalidInputError
-from topobelief.simulation.scenario import SCENARIO_NAMES, Goal, Scenario, named_scenario
+from topobelief.simulation.scenario import SCENARIO_NAMES, CandidateRule, Goal, Scenario, named_scenario
 from topobelief.world import World
 
 
@@ -53,6 +53,20 @@ def test_a_scenario_without_room_is_refused():
         Scenario("room", world, (0.1, 2, 0), (Goal((8, 8)),))
     with pytest.raises(InvalidInputError, match="at least one goal"):
         Scenario("room", world, (2, 2, 0), ())
+
+
+def test_paths_narrower_than_the_chassis_are_refused_and_tight_ones_cautioned_against():
+    world = World.from_boxes([(4, 4, 6, 6)], bounds=(0, 0, 10, 10))
+
+    def scenario(radius: float) -> Scenario:
+        return Scenario("room", world, (2, 2, 0), (Goal((8, 8)),), rule=CandidateRule(robot_radius=radius))
+
+    with pytest.raises(InvalidInputError, match=r"chassis of 0.25 m in radius, got a robot_radius of 0.15 m; raise it"):
+        scenario(0.15)
+    assert "0.05 m beside the chassis of 0.25 m" in (scenario(0.3).caution or "")
+    assert scenario(0.25).caution is not None
+    assert scenario(0.35).caution is None
+    assert all(named_scenario(name).caution is None for name in SCENARIO_NAMES)
 
 
 def test_an_unknown_name_is_refused():

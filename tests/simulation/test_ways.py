@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from topobelief.simulation.ways import candidate_paths, place_with_room, stands_
 from topobelief.world import World
 
 RULE = CandidateRule(num_vertices=150)
+SURE = {"chassis": 0.25, "position_error": 0.0}
 
 
 @pytest.fixture(scope="module")
@@ -19,7 +22,7 @@ def room() -> World:
 
 
 def test_a_robot_in_the_open_starts_where_it_is(room):
-    paths = candidate_paths(room, np.array([1.0, 1.0, 0.0]), Goal((7, 7), 4), RULE, seed=0)
+    paths = candidate_paths(room, np.array([1.0, 1.0, 0.0]), Goal((7, 7), 4), RULE, **SURE, seed=0)
     assert 1 < len(paths) <= 4
     for path in paths:
         assert path[0].tolist() == [1, 1]
@@ -31,7 +34,7 @@ def test_a_robot_by_a_wall_steps_away_first(room):
     place = place_with_room(room, here, 0.35)
     assert room.clearance([place])[0] > 0.35
     assert 0.25 < np.linalg.norm(place - here) < 0.4
-    (path, *_) = candidate_paths(room, np.array([*here, 0.0]), Goal((7, 7)), RULE, seed=0)
+    (path, *_) = candidate_paths(room, np.array([*here, 0.0]), Goal((7, 7)), RULE, **SURE, seed=0)
     assert path[0].tolist() == place.tolist()
 
 
@@ -41,10 +44,31 @@ def test_a_robot_far_from_any_room_stays(room):
 
 
 def test_a_tight_goal_is_planned_for_what_fits(room):
-    (path, *_) = candidate_paths(room, np.array([1.0, 1.0, 0.0]), Goal((7.7, 7.7), 2), RULE, seed=0)
+    (path, *_) = candidate_paths(room, np.array([1.0, 1.0, 0.0]), Goal((7.7, 7.7), 2), RULE, **SURE, seed=0)
     assert path[-1].tolist() == [7.7, 7.7]
     with pytest.raises(PlanningError, match="in an obstacle"):
-        candidate_paths(room, np.array([1.0, 1.0, 0.0]), Goal((4, 4), 2), RULE, seed=0)
+        candidate_paths(room, np.array([1.0, 1.0, 0.0]), Goal((4, 4), 2), RULE, **SURE, seed=0)
+
+
+def test_paths_keep_more_than_the_chassis_and_the_error_of_the_position(room):
+    """Whatever the rule says, a robot that errs and strays from its path does not touch."""
+    tight = CandidateRule(num_vertices=150, robot_radius=0.25)
+    for position_error in (0.0, 0.3):
+        paths = candidate_paths(
+            room, np.array([1.0, 1.0, 0.0]), Goal((7, 7), 4), tight, chassis=0.25, position_error=position_error, seed=0
+        )
+        points = np.concatenate(
+            [start + np.linspace(0, 1, 50)[:, None] * (end - start) for p in paths for start, end in pairwise(p)]
+        )
+        assert room.clearance(points).min() > 0.25 + position_error + 0.06
+
+
+def test_a_goal_without_room_for_the_error_of_the_position_is_out_of_reach(room):
+    here, goal = np.array([1.0, 1.0, 0.0]), Goal((7.7, 7.7), 2)
+    (path, *_) = candidate_paths(room, here, goal, RULE, chassis=0.25, position_error=0.03, seed=0)
+    assert path[-1].tolist() == [7.7, 7.7]
+    with pytest.raises(PlanningError, match=r"room for the chassis of 0.25 m and a position error of 0.10 m"):
+        candidate_paths(room, here, goal, RULE, chassis=0.25, position_error=0.1, seed=0)
 
 
 def test_what_stands_in_the_way_is_near_and_ahead():

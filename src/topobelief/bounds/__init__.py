@@ -1,5 +1,5 @@
-"""Bounds of the joint entropy: the paper's and Fischer's, as bounds of ln det I and of J."""
+"""Bounds of ln det I, and so of the entropy: a family a file, each written in terms of forms."""
 
-from topobelief.bounds.entropy_bounds import Bounds, LogDetBounds, entropy_bounds, log_det_bounds
+from topobelief.bounds.entropy_bounds import Bounds, entropy_bounds
 
-__all__ = ["Bounds", "LogDetBounds", "entropy_bounds", "log_det_bounds"]
+__all__ = ["Bounds", "entropy_bounds"]

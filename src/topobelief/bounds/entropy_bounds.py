@@ -1,24 +1,23 @@
-"""Lower and upper bounds of the joint entropy, a family and a determinant at a choice."""
+"""Lower and upper bounds of the joint entropy of one graph, a family at a choice."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
-from topobelief.bounds.fischer import fischer_bounds
-from topobelief.bounds.paper import paper_bounds
+from topobelief.bounds.fischer import fischer
+from topobelief.bounds.fischer_step import fischer_step
+from topobelief.bounds.options import BoundOptions, Determinant
+from topobelief.bounds.paper import paper
 from topobelief.entropy import entropy_of
 from topobelief.errors import require_choice
-from topobelief.graph.fisher import FisherRows, fisher_rows
+from topobelief.forms.of_graph import GraphForms
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.graph.topology import checked_anchor
-from topobelief.linalg import LogDet, LogDetSolver
 
-Family = Literal["paper", "fischer"]
-Determinant = Literal["cholesky", "hadamard"]
+Family = Literal["paper", "fischer", "fischer_step"]
 
-_FAMILIES: dict[str, Callable[..., tuple[LogDet, LogDet]]] = {"paper": paper_bounds, "fischer": fischer_bounds}
+_FAMILIES = {"paper": paper, "fischer": fischer, "fischer_step": fischer_step}
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,14 +26,6 @@ class Bounds:
 
     lower: float
     upper: float
-
-
-@dataclass(frozen=True, slots=True)
-class LogDetBounds:
-    """lower <= ln det I <= upper, each with its rounding error beside it."""
-
-    lower: LogDet
-    upper: LogDet
 
 
 def entropy_bounds(
@@ -47,8 +38,8 @@ def entropy_bounds(
     graph
         At the poses where the information is wanted: optimise it first (`topobelief.optimize`).
     family
-        "fischer": any noise, never looser than the paper's with the same anchor. "paper": Kitanov and Indelman's, one
-        block-isotropic Omega on all edges.
+        "fischer": any noise, never looser than the paper's with the same anchor. "fischer_step": never looser than Fischer's,
+        some times as expensive. "paper": Kitanov and Indelman's, one block-isotropic Omega on all edges.
     determinant
         "cholesky": exact determinant in the lower bound. "hadamard": product of its diagonal, cheaper and looser.
     anchor
@@ -70,17 +61,13 @@ def entropy_bounds(
     IllConditionedError
         If double precision cannot give a bound to 0.1 nats.
     """
+    require_choice("family", family, _FAMILIES)
+    options = BoundOptions(determinant)
     anchor = checked_anchor(graph.num_poses, anchor)
     graph.topology.require_connected(anchor=anchor, names=graph.ids)
-    solver = LogDetSolver(graph.edges, graph.num_poses, anchor)
-    bounds = log_det_bounds(fisher_rows(graph), solver, family=family, determinant=determinant)
-    upper = entropy_of(bounds.lower, graph.num_poses - 1, graph.tangent_dim, what="bound of the joint entropy")
-    lower = entropy_of(bounds.upper, graph.num_poses - 1, graph.tangent_dim, what="bound of the joint entropy")
-    return Bounds(lower.value - lower.error, upper.value + upper.error)
-
-
-def log_det_bounds(rows: FisherRows, solver: LogDetSolver, *, family: str, determinant: str) -> LogDetBounds:
-    """Bounds of ln det I; arguments as in `entropy_bounds`."""
-    require_choice("family", family, _FAMILIES)
-    require_choice("determinant", determinant, get_args(Determinant))
-    return LogDetBounds(*_FAMILIES[family](rows, solver, hadamard=determinant == "hadamard"))
+    forms = GraphForms(graph, anchor=anchor)
+    low, high = (
+        entropy_of(log_det, forms.num_free, forms.tangent_dim, what="bound of the joint entropy")
+        for log_det in _FAMILIES[family](forms, options)
+    )
+    return Bounds(high.value - high.error, low.value + low.error)

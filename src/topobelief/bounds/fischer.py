@@ -11,31 +11,25 @@ are 3 tau and 2 tau + ln det(L_tilde + xi^2 D), plus (n - 1) ln |Omega|, D_ii th
 
 from __future__ import annotations
 
-import math
+from topobelief.bounds.options import BoundOptions
+from topobelief.forms.protocol import Forms
+from topobelief.linalg.estimate import Estimate, Number
+from topobelief.signatures.spanning_trees import weighted_trees
 
-from topobelief.graph.fisher import FisherRows
-from topobelief.linalg import LogDet, LogDetSolver
+
+def fischer(forms: Forms[Number], options: BoundOptions) -> tuple[Estimate[Number], Estimate[Number]]:
+    """(lower, upper) bounds of ln det I; Hadamard's determinant replaces ln det I_rr by the sum over its diagonal blocks."""
+    rotations = forms.hadamard("rotations") if options.hadamard else forms.log_det("rotations")
+    return least(forms), positions(forms) + rotations
 
 
-def fischer_bounds(rows: FisherRows, solver: LogDetSolver, *, hadamard: bool) -> tuple[LogDet, LogDet]:
-    """(lower, upper) bounds of ln det I.
+def positions(forms: Forms[Number]) -> Estimate[Number]:
+    """ln det I_pp."""
+    return float(forms.split[0]) * forms.log_det("trees_p") if forms.isotropic else forms.log_det("positions")
 
-    Parameters
-    ----------
-    rows
-        The graph's whitened rows.
-    solver
-        Holds the anchor; matrices of one block size share its ordering and symbolic factor. The upper bound depends on
-        the anchor.
-    hadamard
-        Replace ln det I_rr by the sum over its diagonal blocks: looser, and one factorisation less.
-    """
-    positions = solver.log_det(rows.positions())
-    ratio = rows.weight_ratio()
-    if ratio is None:
-        lower = positions + solver.log_det(rows.rotations_given_positions())
-    else:  # L_r|p is a multiple of I_pp's Laplacian
-        k, q = rows.group.position_dim, rows.group.rotation_dim
-        lower = ((k + q) / k * positions).plus(q * solver.num_free * math.log(ratio))
-    rotations = solver.hadamard(rows.rotations()) if hadamard else solver.log_det(rows.rotations())
-    return lower, positions + rotations
+
+def least(forms: Forms[Number]) -> Estimate[Number]:
+    """ln det I_pp + ln det L_r|p, the lower bound of ln det I."""
+    if forms.isotropic:
+        return weighted_trees(forms)
+    return forms.log_det("positions") + forms.log_det("rotations_given_positions")

@@ -5,78 +5,63 @@ edges that leave i, in SE(2) and, with q for 1, in SE(3):
 
     kappa tau  <=  ln det I - (n - 1) ln |Omega|  <=  k tau + q ln det(L_tilde + Psi I).
 
-L_tilde and L_tilde + Psi I share their sparsity: one ordering and one symbolic factor serve both.
+w_r Psi is the largest lever sum, so w_r (L_tilde + Psi I) is the Laplacian with the weights w_r plus that.
 """
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
+from topobelief.arrays import FloatArray
+from topobelief.bounds.options import BoundOptions
 from topobelief.errors import InvalidGraphError
-from topobelief.graph.fisher import FisherRows
-from topobelief.graph.information import SAME_NOISE
-from topobelief.linalg import LogDet, LogDetSolver, laplacian_form
+from topobelief.forms.protocol import Forms
+from topobelief.graph.information import SAME_NOISE, isotropic_weights
+from topobelief.linalg.estimate import Estimate, Number
+from topobelief.signatures.spanning_trees import weighted_trees
 
 
-def paper_bounds(rows: FisherRows, solver: LogDetSolver, *, hadamard: bool) -> tuple[LogDet, LogDet]:
-    """(lower, upper) bounds of ln det I.
-
-    Parameters
-    ----------
-    rows
-        The graph's whitened rows.
-    solver
-        Holds the anchor, on which the upper bound depends.
-    hadamard
-        Replace ln det(L_tilde + Psi I) by the sum of ln(d(i) + Psi), d the diagonal of L_tilde.
+def paper(forms: Forms[Number], options: BoundOptions) -> tuple[Estimate[Number], Estimate[Number]]:
+    """(lower, upper) bounds of ln det I; Hadamard's determinant replaces ln det(L_tilde + Psi I) by the sum of ln(d(i) + Psi).
 
     Raises
     ------
     InvalidGraphError
         Where the noise is not one block-isotropic Omega on all edges.
     """
-    w_p, w_r = require_equal_noise(rows)
-    k, q = rows.group.position_dim, rows.group.rotation_dim
-    num_edges = len(rows.edges)
-    laplacian = laplacian_form(rows.edges, np.ones(num_edges))
-    tau = solver.log_det(laplacian)
-    ln_w_p, ln_w_r = solver.num_free * math.log(w_p), solver.num_free * math.log(w_r)
-    lower = (float(k + q) * tau).plus(k * ln_w_p + q * ln_w_r)
-    shifted = solver.hadamard(laplacian, shift=psi(rows)) if hadamard else solver.log_det(laplacian, shift=psi(rows))
-    return lower, (float(k) * tau + float(q) * shifted).plus(k * ln_w_p + q * ln_w_r)
+    _require_equal_weights(forms.weights, isotropic=forms.isotropic)
+    k, q = forms.split
+    determinant = forms.hadamard if options.hadamard else forms.log_det
+    shifted = determinant("trees_r", shift=forms.largest_lever_sum())
+    return weighted_trees(forms), float(k) * forms.log_det("trees_p") + float(q) * shifted
 
 
-def psi(rows: FisherRows) -> float:
-    """Psi = xi^2 max over i of the sum of |x_i - x_j|^2 over the edges i -> j."""
-    w_p, w_r = require_equal_noise(rows)
-    if len(rows.edges) == 0:
-        return 0.0
-    return w_p / w_r * float(np.max(np.bincount(rows.edges[:, 0], weights=rows.squared_lengths())))
+def require_equal_noise(information: FloatArray) -> None:
+    """Raise where edges do not share one block-isotropic Omega.
 
-
-def require_equal_noise(rows: FisherRows) -> tuple[float, float]:
-    """(w_p, w_r) of the one block-isotropic Omega that all edges share.
+    Parameters
+    ----------
+    information : shape (num_edges, kappa, kappa)
 
     Raises
     ------
     InvalidGraphError
         Names the edge that differs.
     """
-    if len(rows.edges) == 0:
-        return 1.0, 1.0
-    if rows.weights is None:
+    weights = isotropic_weights(information)
+    _require_equal_weights(weights or (information[:, 0, 0], information[:, 0, 0]), isotropic=weights is not None)
+
+
+def _require_equal_weights(weights: tuple[FloatArray, FloatArray], *, isotropic: bool) -> None:
+    if not isotropic:
         raise InvalidGraphError(
             "the paper's bounds expect one block-isotropic information matrix diag(w_p I, w_r I) on all edges, "
             'got one that is not block-isotropic; use family="fischer"'
         )
-    w_p, w_r = rows.weights
-    for name, w in (("position", w_p), ("rotation", w_r)):
-        different = np.flatnonzero(np.abs(w - w[0]) > SAME_NOISE * w[0])
+    for name, w in zip(("position", "rotation"), weights, strict=True):
+        different = np.flatnonzero(np.abs(w - w[:1]) > SAME_NOISE * w[:1])
         if different.size:
             raise InvalidGraphError(
                 f"the paper's bounds expect the same noise on all edges, got {name} information {w[0]:.6g} at edge 0 and "
                 f'{w[different[0]]:.6g} at edge {different[0]}; use family="fischer"'
             )
-    return float(w_p[0]), float(w_r[0])

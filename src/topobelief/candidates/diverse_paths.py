@@ -1,33 +1,31 @@
 """Topologically and geometrically diverse paths from start to goal, on a roadmap.
 
-First the shortest path of each homotopy class within the detour limit (`homotopy`). Then, to fill up, Voss, Moll and
-Kavraki, "A heuristic approach to finding diverse short paths", ICRA 2015: keep a queue of paths, each with the balls
-that it avoids, at first the shortest path and no ball. Take one; twice, add a ball around a random point of it and
-find the shortest path that avoids all its balls; queue it, and keep it if it is far from all paths that were kept.
+First the shortest path of each homotopy class within the detour limit (`homotopy`). Then, to fill up, detours around
+balls (`detours`), as far as they differ from all paths that are there (`distinct_paths`): by the radius of the balls,
+which halves when few more are found.
 """
 
 from __future__ import annotations
 
 import math
-from collections import deque
-from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from topobelief.arrays import BoolArray, FloatArray
-from topobelief.candidates.homotopy import Rays, Word, joined, shortest_paths_by_class
-from topobelief.candidates.polyline import distances_to_segments, path_length, sampled, stations, subdivided
+from topobelief.arrays import FloatArray
+from topobelief.candidates.detours import Balls, DetourSearch
+from topobelief.candidates.distinct_paths import DistinctPaths
+from topobelief.candidates.homotopy import Rays, shortest_paths_by_class
+from topobelief.candidates.polyline import path_length
 from topobelief.candidates.roadmap import Roadmap
+from topobelief.candidates.straightening import Straightening
 from topobelief.errors import InvalidInputError, PlanningError
-from topobelief.world import shapes
 
-_BALLS_PER_PATH = 2  # how often each path of the queue is varied
-_ATTEMPTS_PER_PATH = 8  # balls of one radius tried, per path asked for
-_NUM_SAMPLES = 32  # places at which the Fréchet distance of two paths is taken
-_PIECES = 4  # of each leg of a path, between which corners are cut
-_LOOKAHEAD = 32  # pieces that a cut corner replaces at most
+_ATTEMPTS_PER_PATH = 8  # balls of one radius tried at most, per path asked for
+_ATTEMPTS = 160  # of which the radius is halved
+_LEAST_YIELD = 20  # where they bring fewer paths
+_HALVINGS = 4  # in the end balls, and differences, of 1/16 of the first radius
+_NUM_LANDMARKS = 64
 
 
 def diverse_paths(
@@ -49,16 +47,16 @@ def diverse_paths(
     start, goal : shape (2,) or (3,)
         Metres; a heading is ignored. Places that the roadmap was not built for are joined to it.
     num_paths
-        How many at most; fewer where the roadmap has no more that differ.
+        How many at most; fewer where the roadmap has no more that differ by 1/16 of the ball radius.
     max_detour
         No path is longer than this many times the first one; at least 1. None: any length.
     seed
         The same seed gives the same paths.
     ball_radius
-        Radius of the avoided balls, and the Fréchet distance by which a path that fills up differs from all others;
-        as a share of the shortest path's length.
+        Radius of the avoided balls, and the Fréchet distance by which a path that fills up differs from all others, as a
+        share of the shortest path's length. Halved up to four times where it leaves too few paths.
     max_rays
-        Obstacles whose sides make a class, the largest first.
+        Obstacles whose sides make a class, the largest first. None is smaller than a ball, or a speck (see `Rays`).
 
     Returns
     -------
@@ -89,135 +87,93 @@ def diverse_paths(
     radius = ball_radius * length
     max_length = math.inf if max_detour is None else max_detour * length
     rays = Rays.of_obstacles(roadmap, min_size=radius, max_length=max_length, max_rays=max_rays)
+    straightening = Straightening(roadmap, rays)
     classes = shortest_paths_by_class(roadmap, rays, num_classes=num_paths, max_length=max_length)
-    paths = [
-        _straightened(roadmap, rays, _straightened(roadmap, rays, roadmap.vertices[path]), pieces=_PIECES) for path in classes
-    ]
-    paths = _within_limit(paths, max_detour)
-    rng = np.random.default_rng(seed)
-    while len(paths) < num_paths and radius >= roadmap.robot_radius:
-        further = _further_paths(roadmap, rays, classes, paths, num_paths, radius=radius, max_length=max_length, rng=rng)
-        paths = _within_limit(paths + further, max_detour)
-        radius /= 2
-    return paths
+    selection = _Selection(roadmap, straightening, num_paths, max_detour, _landmarks(roadmap, max_length))
+    for path in classes:
+        selection.add(straightening.by_pieces(roadmap.vertices[straightening.by_vertices(path)]))
+    if not selection.full:
+        search = DetourSearch(roadmap, classes, max_length, rng=np.random.default_rng(seed))
+        _fill_up(selection, search, straightening, radius)
+    return sorted(selection.paths, key=path_length)
 
 
-def _within_limit(paths: list[FloatArray], max_detour: float | None) -> list[FloatArray]:
-    """The paths that are not longer than the limit times the shortest, by length."""
-    by_length = sorted(paths, key=path_length)
-    longest = math.inf if max_detour is None else max_detour * path_length(by_length[0])
-    return [path for path in by_length if path_length(path) <= longest]
+class _Selection:
+    """Paths within the detour limit, up to a number; those that fill up are far from all others."""
+
+    def __init__(
+        self,
+        roadmap: Roadmap,
+        straightening: Straightening,
+        num_paths: int,
+        max_detour: float | None,
+        landmarks: FloatArray,
+    ) -> None:
+        self.paths: list[FloatArray] = []
+        self.num_paths = num_paths
+        self._roadmap = roadmap
+        self._straightening = straightening
+        self._max_detour = math.inf if max_detour is None else max_detour
+        self._shortest = math.inf  # metres
+        self._distinct = DistinctPaths(landmarks)
+
+    @property
+    def full(self) -> bool:
+        """Whether no more paths are wanted."""
+        return len(self.paths) == self.num_paths
+
+    def add(self, path: FloatArray) -> None:
+        """Add a path, unless it is too long; drop those that now are, where it is the shortest so far."""
+        length = path_length(path)
+        if length > self._max_detour * self._shortest:
+            return
+        self.paths.append(path)
+        self._distinct.add(path)
+        if length < self._shortest:
+            self._shortest = length
+            self.paths = [path for path in self.paths if path_length(path) <= self._max_detour * length]
+
+    def consider(self, vertices: tuple[int, ...], balls: Balls, radius: float) -> bool:
+        """Cut the corners of a path that is clear of balls and add it; or return False, where it is near to another.
+
+        To cut corners is expensive, and the path through the vertices shows of most that they are near to another.
+        """
+        path = self._roadmap.vertices[list(vertices)]
+        if self.full or self._distinct.any_within(path, radius):
+            return False
+        path = self._straightening.by_pieces(path, balls)
+        if self._distinct.any_within(path, radius):
+            return False
+        self.add(path)
+        return True
 
 
-def _further_paths(
-    roadmap: Roadmap,
-    rays: Rays,
-    classes: list[list[int]],
-    paths: list[FloatArray],
-    num_paths: int,
-    *,
-    radius: float,
-    max_length: float,
-    rng: np.random.Generator,
-) -> list[FloatArray]:
-    """Detours around balls of a radius, further than it from all paths and from each other, to make `num_paths`."""
-    further: list[FloatArray] = []
-    samples = [sampled(path, _NUM_SAMPLES) for path in paths]
-    for detour in _detours_around_balls(
-        roadmap, classes, radius=radius, max_length=max_length, attempts=_ATTEMPTS_PER_PATH * num_paths, rng=rng
-    ):
-        path, sample = roadmap.vertices[detour.path], np.zeros((0, 2))
-        for pieces in (1, _PIECES):  # the first is cheap and enough to see that most are nothing new
-            path = _straightened(roadmap, rays, path, pieces=pieces, centres=detour.centres, radius=radius)
-            sample = sampled(path, _NUM_SAMPLES)
-            if any(shapes.frechet_distance(sample, other) <= radius for other in samples):
+def _fill_up(selection: _Selection, search: DetourSearch, straightening: Straightening, radius: float) -> None:
+    """Add detours around balls that are further than the balls' radius from all paths, then with half the radius, and so on."""
+    known: set[tuple[int, ...]] = set()
+    near: list[tuple[tuple[int, ...], Balls]] = []  # to another path, by the radius so far
+    for least_yield in (*[_LEAST_YIELD] * _HALVINGS, 1):
+        near = [(vertices, balls) for vertices, balls in near if not selection.consider(vertices, balls, radius)]
+        for _ in range(math.ceil(_ATTEMPTS_PER_PATH * selection.num_paths / _ATTEMPTS)):
+            num_before = len(selection.paths)
+            for _ in range(_ATTEMPTS):
+                if selection.full:
+                    return
+                detour = search.vary(radius)
+                if detour is None:
+                    continue
+                vertices = tuple(straightening.by_vertices(detour.path, detour.balls))
+                if vertices not in known:
+                    known.add(vertices)
+                    if not selection.consider(vertices, detour.balls, radius):
+                        near.append((vertices, detour.balls))
+            if len(selection.paths) < num_before + least_yield:
                 break
-        else:
-            further.append(path)
-            samples.append(sample)
-        if len(samples) == num_paths:
-            break
-    return further
+        radius /= 2
 
 
-@dataclass(frozen=True, eq=False)
-class _Detour:
-    """A path on the roadmap that avoids some balls."""
-
-    path: list[int]
-    centres: FloatArray  # of the balls, shape (B, 2)
-    blocked: BoolArray  # the edges that enter a ball, shape (E,)
-
-
-def _detours_around_balls(
-    roadmap: Roadmap,
-    paths: list[list[int]],
-    *,
-    radius: float,
-    max_length: float,
-    attempts: int,
-    rng: np.random.Generator,
-) -> Iterator[_Detour]:
-    """Variations of some paths, then variations of these, and again from the first once none is left to vary."""
-    starts, ends = roadmap.vertices[roadmap.edges[:, 0]], roadmap.vertices[roadmap.edges[:, 1]]
-    start, goal = roadmap.vertices[:2]
-    none = np.zeros(len(roadmap.edges), dtype=np.bool_)
-    queue: deque[_Detour] = deque()
-    for attempt in range(attempts):
-        if not queue:
-            queue.extend(_Detour(path, np.zeros((0, 2)), none) for path in paths)
-        detour = queue[0] if attempt % _BALLS_PER_PATH < _BALLS_PER_PATH - 1 else queue.popleft()
-        waypoints = roadmap.vertices[detour.path]
-        centre = stations(waypoints, rng.uniform(0, path_length(waypoints), 1)).positions[0]
-        if min(np.linalg.norm(centre - start), np.linalg.norm(centre - goal)) <= radius:
-            continue  # it would leave no way out or in
-        blocked = detour.blocked | (distances_to_segments(centre, starts, ends) <= radius)
-        path = roadmap.shortest_path(blocked=blocked, max_length=max_length)
-        if path is not None:
-            queue.append(_Detour(path, np.vstack([detour.centres, centre]), blocked))
-            yield queue[-1]
-
-
-def _straightened(
-    roadmap: Roadmap,
-    rays: Rays,
-    path: FloatArray,
-    *,
-    pieces: int = 1,
-    centres: FloatArray | None = None,
-    radius: float = 0.0,
-) -> FloatArray:
-    """The shortest of the polylines through some points of a path that is free, in its class, and clear of balls.
-
-    Parameters
-    ----------
-    path : shape (waypoints, 2)
-        Free.
-    pieces
-        Equal ones, into which each leg is cut; their ends are the points to choose from.
-    centres, radius
-        Of the balls.
-    """
-    places = subdivided(path, pieces)
-    words = [Word()]  # so far, by place
-    for letters in rays.crossings(places[:-1], places[1:]):
-        words.append(joined(words[-1], letters))
-    first, last = np.triu_indices(len(places), k=1)
-    near = last - first <= _LOOKAHEAD
-    first, last = first[near], last[near]
-    allowed = roadmap.world.segments_free(places[first], places[last], roadmap.robot_radius)
-    for centre in () if centres is None else centres:
-        allowed &= distances_to_segments(centre, places[first], places[last]) > radius
-    allowed |= (first % pieces == 0) & (last - first == pieces)  # the path's own legs
-    first, last = first[allowed], last[allowed]
-    lengths: list[float] = np.linalg.norm(places[last] - places[first], axis=1).tolist()
-    pairs: list[list[int]] = np.stack([first, last], axis=1).tolist()
-    best = [0.0] + [math.inf] * (len(places) - 1)  # length of the best way to each place
-    before = [0] * len(places)
-    for (i, j), length, letters in zip(pairs, lengths, rays.crossings(places[first], places[last]), strict=True):
-        if best[i] + length < best[j] and joined(words[i], letters) == words[j]:  # best[i] is final: i ascends
-            best[j], before[j] = best[i] + length, i
-    kept = [len(places) - 1]
-    while kept[-1] > 0:
-        kept.append(before[kept[-1]])
-    return places[kept[::-1]]
+def _landmarks(roadmap: Roadmap, max_length: float) -> FloatArray:
+    """Vertices all over the part of the roadmap where paths of a length can be."""
+    through = roadmap.distances_to(0) + roadmap.distances_to(1)
+    within_reach = np.flatnonzero(through <= max(max_length, through[0]))
+    return roadmap.vertices[within_reach[np.linspace(0, len(within_reach) - 1, _NUM_LANDMARKS).astype(int)]]

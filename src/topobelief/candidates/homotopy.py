@@ -13,10 +13,12 @@ import heapq
 import math
 from collections import defaultdict
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from topobelief.arrays import FloatArray
+from topobelief.arrays import BoolArray, FloatArray
+from topobelief.candidates.polyline import path_length
 from topobelief.candidates.roadmap import Roadmap
 from topobelief.world import shapes
 
@@ -36,20 +38,34 @@ class Rays:
     origins: FloatArray
 
     @classmethod
-    def of_obstacles(cls, roadmap: Roadmap, *, min_size: float = 0.0, max_length: float = math.inf, max_rays: int = 32) -> Rays:
+    def of_obstacles(
+        cls,
+        roadmap: Roadmap,
+        *,
+        min_size: float = 0.0,
+        max_length: float = math.inf,
+        max_rays: int | None = None,
+        specks: bool = False,
+    ) -> Rays:
         """Rays of the obstacles that are worth telling apart.
 
         Of the holes in the region that the robot's centre can reach (see `World.component`), those that measure at
         least `min_size` (corner to corner of their extent, metres) and that a path from start to goal of at most
         `max_length` can get around; and of these the `max_rays` largest.
+
+        Which side of a speck a path takes does not matter, and a map has many from noise and the legs of furniture. So
+        without `specks` a hole counts only if it holds an obstacle of at least the robot's radius, corner to corner, or
+        smaller ones that the robot cannot pass between, over more than twice its diameter (a fence, say).
         """
         start, goal = roadmap.vertices[:2]
-        obstacles = shapes.holes(roadmap.region)
-        size, points = shapes.sizes(obstacles), shapes.points_within(obstacles)
+        holes = shapes.holes(roadmap.region)
+        size, points = shapes.sizes(holes), shapes.points_within(holes)
         detour = np.linalg.norm(points - start, axis=1) + np.linalg.norm(points - goal, axis=1)
+        worth_it = (size >= min_size) & (detour <= max_length)
+        if not specks:
+            worth_it &= _matters(roadmap, holes)
         largest_first = np.argsort(-size, kind="stable")
-        worth_it = largest_first[(size >= min_size)[largest_first] & (detour <= max_length)[largest_first]]
-        return cls(points[worth_it[:max_rays]])
+        return cls(points[largest_first[worth_it[largest_first]][:max_rays]])
 
     def crossings(self, starts: FloatArray, ends: FloatArray) -> list[Word]:
         """The letters that each segment spells, in order; shapes (N, 2).
@@ -79,6 +95,22 @@ class Rays:
         for letters in self.crossings(waypoints[:-1], waypoints[1:]):
             word = joined(word, letters)
         return word
+
+
+class ClassCount(NamedTuple):
+    """How many homotopy classes some paths are of."""
+
+    number: int  # about obstacles that matter to the robot
+    is_exact: bool  # whether there are no more about all obstacles
+
+
+def count_classes(roadmap: Roadmap, paths: list[FloatArray]) -> ClassCount:
+    """Homotopy classes among paths from the start to the goal of a roadmap, each of shape (waypoints, 2)."""
+    max_length = max(map(path_length, paths), default=0.0)  # what they cannot get around does not part them
+    all_rays = Rays.of_obstacles(roadmap, max_length=max_length, specks=True)
+    rays = Rays.of_obstacles(roadmap, max_length=max_length)
+    number = len({rays.word(path) for path in paths})
+    return ClassCount(number, number == len({all_rays.word(path) for path in paths}))
 
 
 def joined(word: Word, letters: Word) -> Word:
@@ -210,6 +242,15 @@ class _Trail:
                 return True
             later, d = vertex, c
         return False
+
+
+def _matters(roadmap: Roadmap, holes: shapes.ShapeArray) -> BoolArray:
+    """Which holes in the reachable region are more than specks, see `Rays.of_obstacles`; shape (N,)."""
+    radius = roadmap.robot_radius
+    solid = shapes.largest_within(holes, shapes.holes(roadmap.world.free))
+    x_min, y_min, x_max, y_max = (shapes.extents(holes) + radius * np.array([1, 1, -1, -1])).T  # of what is in the hole
+    spread = np.hypot(np.maximum(x_max - x_min, 0.0), np.maximum(y_max - y_min, 0.0))
+    return (solid >= radius) | (spread > 2 * (2 * radius))
 
 
 def _neighbours(roadmap: Roadmap, rays: Rays) -> list[list[tuple[int, float, Word]]]:

@@ -1,14 +1,16 @@
-"""The commands in one application, and what becomes of errors: one line and an exit code."""
+"""The commands in one application, and what becomes of errors and warnings: one line, and an exit code for errors."""
 
 from __future__ import annotations
 
 import sys
+import warnings
 from collections.abc import Sequence
 from typing import Annotated, cast
 
 import typer
 
 from topobelief.cli.benchmark import benchmark
+from topobelief.cli.command import Command, StartCommand
 from topobelief.cli.info import info
 from topobelief.cli.plan import plan
 from topobelief.cli.reproduce import reproduce
@@ -22,15 +24,15 @@ INTERRUPTED = 130
 # what all errors about options derive from, which typer does not export
 _UsageError = cast("type[Exception]", typer.BadParameter.__mro__[1])
 
-app = typer.Typer(name="topobelief", add_completion=False, pretty_exceptions_enable=False)
-app.command()(plan)
-app.command()(info)
-app.command()(benchmark)
-app.command()(reproduce)
-app.command()(simulate)
-app.command()(simulate_compare)
-app.command()(study)
-app.command()(study_report)
+app = typer.Typer(name="topobelief", pretty_exceptions_enable=False)
+app.command(cls=StartCommand)(plan)
+app.command(cls=Command)(info)
+app.command(cls=Command)(benchmark)
+app.command(cls=Command)(reproduce)
+app.command(cls=Command)(simulate)
+app.command(cls=Command)(simulate_compare)
+app.command(cls=Command)(study)
+app.command(cls=Command)(study_report)
 
 
 @app.callback(invoke_without_command=True)
@@ -53,7 +55,9 @@ def _topobelief(  # pyright: ignore[reportUnusedFunction]  (typer calls it)
 def run(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code."""
     try:
-        code = app(args=None if arguments is None else list(arguments), prog_name="topobelief", standalone_mode=False)
+        with warnings.catch_warnings():
+            warnings.showwarning = _warned
+            code = app(args=None if arguments is None else list(arguments), prog_name="topobelief", standalone_mode=False)
     except (KeyboardInterrupt, typer.Abort):
         code = INTERRUPTED
     except TopobeliefError as error:
@@ -68,5 +72,13 @@ def run(arguments: Sequence[str] | None = None) -> int:
 
 
 def _failed(message: str) -> int:
-    print(f"topobelief: {' '.join(message.split())}", file=sys.stderr)
+    _say(message)
     return BAD_INPUT
+
+
+def _warned(message: Warning | str, *_: object, **__: object) -> None:
+    _say(f"warning: {message}")
+
+
+def _say(message: str) -> None:
+    print(f"topobelief: {' '.join(message.split())}", file=sys.stderr)

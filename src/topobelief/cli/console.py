@@ -29,6 +29,7 @@ class Reporter:
     def __init__(self, *, as_json: bool) -> None:
         self.as_json = as_json
         self.seconds: dict[str, float] = {}
+        self.notes: list[str] = []
         self._answer = Console(width=None if sys.stdout.isatty() else _PIPE_WIDTH, highlight=False)
         self._progress = Console(stderr=True)
 
@@ -37,6 +38,15 @@ class Reporter:
         if not self.as_json:
             for renderable in renderables:
                 self._answer.print(renderable, markup=False, soft_wrap=isinstance(renderable, str))
+
+    def warn(self, text: str) -> None:
+        """Print a line on stderr, whoever listens."""
+        print(f"topobelief: {text}", file=sys.stderr)
+
+    def note(self, text: str) -> None:
+        """Print what a person should know before relying on the answer, and keep it for the document of a program."""
+        self.notes.append(text)
+        self.say(text)
 
     def answer(self, document: Mapping[str, object]) -> None:
         """Print for a program."""

@@ -12,11 +12,13 @@ from rich.table import Table
 from topobelief.bounds import entropy_bounds
 from topobelief.bounds.entropy_bounds import Determinant, Family
 from topobelief.cli.console import Reporter
-from topobelief.cli.prior import read_prior
+from topobelief.cli.prior import estimated, read_filed
 from topobelief.entropy import joint_entropy_estimate
 from topobelief.errors import IllConditionedError, InvalidGraphError
+from topobelief.graph.components import components
 from topobelief.graph.information import isotropic_weights, shared_information
 from topobelief.graph.pose_graph import PoseGraph
+from topobelief.io.reading import ReadingOptions
 from topobelief.report.tables import quantity_table
 from topobelief.signatures.spanning_trees import log_num_spanning_trees, spanning_tree_signature
 from topobelief.signatures.von_neumann import (
@@ -25,6 +27,7 @@ from topobelief.signatures.von_neumann import (
     von_neumann_entropy,
     von_neumann_entropy_approx,
 )
+from topobelief.symbols import node_name
 
 _BOUNDS: tuple[tuple[Family, Determinant], ...] = (
     ("fischer", "cholesky"),
@@ -33,14 +36,16 @@ _BOUNDS: tuple[tuple[Family, Determinant], ...] = (
     ("paper", "hadamard"),
 )
 
-Value = str | int | float | None | dict[str, float] | list[int]
+_MOST_COMPONENTS = 10  # listed for a person
+
+Value = str | int | float | None | dict[str, float] | list[int] | list[dict[str, int | float | None]]
 
 
 @dataclass(frozen=True, slots=True)
 class Fact:
     """One line: for a program a key and a value, for a person a label and a text."""
 
-    key: str
+    key: str  # empty where only a person cares
     value: Value
     label: str  # empty where only a program cares
     text: str
@@ -61,19 +66,28 @@ class Facts:
 
     def document(self) -> dict[str, object]:
         """For a program."""
-        return {fact.key: fact.value for facts in self.groups.values() for fact in facts}
+        return {fact.key: fact.value for facts in self.groups.values() for fact in facts if fact.key}
 
 
-def describe(path: Path, reporter: Reporter, *, optimized: bool) -> Facts:
-    """All facts of a file's graph.
+def describe(path: Path, reporter: Reporter, *, optimized: bool, reading: ReadingOptions) -> Facts:
+    """All facts of a file's graph; of one that is not connected its size and its components.
 
     Raises
     ------
     FileError
-        If the file is wrong, or its graph is not connected.
+        If the file is wrong.
+    EstimationError
+        If no estimate is found.
     """
-    prior = read_prior(path, reporter, optimized=optimized)
-    filed, graph = prior.filed, prior.graph
+    filed = read_filed(path, reporter, reading=reading)
+    if filed.topology.num_components > 1:
+        return Facts(
+            {
+                str(path): [Fact("file", str(path), "", ""), *_size(filed)],
+                "Components; for fit, signatures and uncertainty of one, pass --component": list(_components(filed)),
+            }
+        )
+    graph = estimated(filed, reporter, optimized=optimized).graph
     at = "at the optimised poses" if optimized else "at the poses as filed"
     with reporter.stage("quantities"):
         return Facts(
@@ -92,19 +106,40 @@ def _size(graph: PoseGraph) -> Iterator[Fact]:
     closures = int(np.count_nonzero(gap > 1))
     parallel = topology.num_edges - topology.simple().num_edges
     degrees = topology.degrees
-    steps = np.linalg.norm(np.diff(graph.positions, axis=0), axis=1)
+    steps = np.linalg.norm(np.diff(graph.positions, axis=0), axis=1)[np.diff(topology.component_labels) == 0]
     yield Fact("space", graph.group.name, "space", graph.group.name)
     yield Fact("num_poses", graph.num_poses, "poses", str(graph.num_poses))
     yield Fact("num_edges", graph.num_edges, "edges", str(graph.num_edges))
     yield Fact("num_loop_closures", closures, "of these loop closures", f"{closures} (not between consecutive poses)")
     yield Fact("num_parallel_edges", parallel, "of these parallel", f"{parallel} (beyond the first between two poses)")
+    most = node_name(int(graph.ids[degrees.argmax()]))
     fixed = [int(graph.ids[index]) for index in graph.fixed]
-    yield Fact("fixed", fixed, "fixed in the file", ", ".join(map(str, fixed)) or "none")
+    yield Fact("fixed", fixed, "fixed in the file", ", ".join(map(node_name, fixed)) or "none")
     yield Fact("mean_degree", float(degrees.mean()), "mean degree", f"{degrees.mean():.2f}")
-    yield Fact("max_degree", int(degrees.max()), "largest degree", f"{degrees.max()} (pose {graph.ids[degrees.argmax()]})")
-    yield Fact("num_components", topology.num_components, "connectivity", "connected")
+    yield Fact("max_degree", int(degrees.max()), "largest degree", f"{degrees.max()} (pose {most})")
+    parts = topology.num_components
+    yield Fact("num_components", parts, "connectivity", "connected" if parts == 1 else f"{parts} components")
     yield Fact("length", float(steps.sum()), "length from pose to pose", f"{steps.sum():.1f} m as filed")
     yield Fact("noise", _noise(graph), "noise", _noise(graph))
+
+
+def _components(graph: PoseGraph) -> Iterator[Fact]:
+    parts = components(graph)
+    rows: list[dict[str, int | float | None]] = []
+    for part in parts:
+        freedom = part.degrees_of_freedom
+        row = {"num_poses": part.num_poses, "num_edges": part.num_edges, "first": int(part.ids[0]), "last": int(part.ids[-1])}
+        rows.append(row | {"chi2_per_dof_filed": part.chi2 / freedom if freedom else None})
+    yield Fact("components", rows, "", "")
+    for part, row in zip(parts[:_MOST_COMPONENTS], rows, strict=False):
+        first, last = node_name(int(part.ids[0])), node_name(int(part.ids[-1]))
+        label = f"pose {first}" if part.num_poses == 1 else f"{part.num_poses} poses, {first} … {last}"
+        ratio = row["chi2_per_dof_filed"]
+        fit = "a tree" if ratio is None else f"χ² per degree of freedom {ratio:.4g} as filed"
+        edges = "1 edge" if part.num_edges == 1 else f"{part.num_edges} edges"
+        yield Fact("", None, label, f"{edges}, {fit}" if part.num_edges else "no edges")
+    if len(parts) > _MOST_COMPONENTS:
+        yield Fact("", None, "and smaller ones", str(len(parts) - _MOST_COMPONENTS))
 
 
 def _noise(graph: PoseGraph) -> str:

@@ -7,14 +7,21 @@ from typing import Annotated
 
 import typer
 
+from topobelief.cli.reading import Component, Drop, Edge2OrderOption, Planar, RobustAsPlain, reading_options
+
 
 def info(
-    graph_file: Annotated[Path, typer.Argument(metavar="GRAPH", help="Pose graph, .g2o or .toro.")],
+    graph_file: Annotated[Path, typer.Argument(metavar="GRAPH", help="Pose graph in g2o or TORO format.")],
     optimize: Annotated[
         bool,
         typer.Option("--optimize/--no-optimize", help="Judge it at its maximum-likelihood poses, or at those in the file."),
     ] = True,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")] = False,
+    drop: Drop = None,
+    robust_as_plain: RobustAsPlain = False,
+    edge2_order: Edge2OrderOption = "toro",
+    component: Component = "all",
+    planar: Planar = False,
 ) -> None:
     """Describe a pose graph: size, fit, spanning trees, signatures, entropy and its bounds."""
     from topobelief.cli.console import Reporter
@@ -22,7 +29,9 @@ def info(
     reporter = Reporter(as_json=as_json)
     with reporter.stage("start-up"):
         from topobelief.cli.graph_facts import describe
-
-    facts = describe(graph_file, reporter, optimized=optimize)
+    reading = reading_options(
+        drop, robust_as_plain=robust_as_plain, edge2_order=edge2_order, component=component, planar=planar
+    )
+    facts = describe(graph_file, reporter, optimized=optimize, reading=reading)
     reporter.say(*facts.tables())
-    reporter.answer(facts.document())
+    reporter.answer(facts.document() | {"notes": reporter.notes})

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import math
+import re
+import warnings
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
+from topobelief.cli.choices import completed, one_of
+from topobelief.cli.reading import Component, Drop, Edge2OrderOption, Planar, RobustAsPlain, reading_options
+from topobelief.errors import NotOptimizedWarning, degrees_hint
+from topobelief.planning.registry import AUTO, BOUNDS, OBJECTIVES, SIGNATURES
+
 # The planner's own choices, repeated so that help need not load it; a test holds them together.
-Objective = Literal["joint", "map", "per_pose"]
-Signature = Literal["spanning_trees", "von_neumann", "von_neumann_approx"]
-Family = Literal["paper", "fischer", "anchored", "auto"]
 Determinant = Literal["cholesky", "hadamard"]
 Proof = Literal["none", "bounded", "optimal"]
 Unknown = Literal["occupied", "free"]
@@ -19,13 +24,58 @@ Unknown = Literal["occupied", "free"]
 _WORLD = "Where the robot may drive"
 _CANDIDATES = "Candidate paths"
 _FACTORS = "Predicted factors"
+_RULES = "Rules of predicted loop closures"
 _DECISION = "Decision"
+_PROOF = "Bounds and proof"
 _OUTPUT = "Output"
+
+_UNIFORM_STD = math.pi / math.sqrt(3)  # radians, of a heading of which nothing is known
+
+
+@dataclass(frozen=True, slots=True)
+class GivenStart:
+    """Where the robot stands, as given: the id of a pose (12, or a symbol such as x3), or a place."""
+
+    pose_id: str | None = None
+    place: tuple[float, float] | None = None
+
+    def __str__(self) -> str:
+        return str(self.pose_id) if self.place is None else f"{self.place[0]:g} {self.place[1]:g}"
+
+
+def _start(text: str) -> GivenStart:
+    words = text.split()
+    try:
+        if len(words) == 1:
+            if not re.fullmatch(r"-?\d+|[A-Za-z]{1,2}\d+", words[0]):
+                raise ValueError
+            return GivenStart(pose_id=words[0])
+        x, y = map(float, words)
+        if math.isfinite(x) and math.isfinite(y):
+            return GivenStart(place=(x, y))
+    except ValueError:
+        pass
+    raise typer.BadParameter(f"expected the id of a pose or X Y in metres, got {text!r}.")
 
 
 def _above_zero(value: float | None) -> float | None:
     if value is not None and not 0 < value < math.inf:
         raise typer.BadParameter(f"expected a number above 0, got {value:g}.")
+    return value
+
+
+def _angle(value: float | None) -> float | None:
+    return _radians(value, math.pi)
+
+
+def _heading_noise(value: float | None) -> float | None:
+    return _radians(value, _UNIFORM_STD)
+
+
+def _radians(value: float | None, largest: float) -> float | None:
+    value = _above_zero(value)
+    if value is not None and value > largest:
+        raise typer.BadParameter(f"expected at most {largest:.6g}, got {value:g}{degrees_hint(value)}.")
     return value
 
 
@@ -50,21 +100,31 @@ def _detour(text: str) -> float:
 
 def plan(
     context: typer.Context,
-    graph_file: Annotated[
-        Path, typer.Argument(metavar="GRAPH", help="Pose graph, .g2o or .toro; the robot stands at its last pose.")
-    ],
+    graph_file: Annotated[Path, typer.Argument(metavar="GRAPH", help="Pose graph in g2o or TORO format.")],
     goal: Annotated[tuple[float, float], typer.Option(metavar="X Y", help="Where to go, metres.", callback=_finite)],
+    start: Annotated[
+        GivenStart | None,
+        typer.Option(
+            metavar="ID | X Y",
+            parser=_start,
+            help="Where the robot stands: id of a pose, or metres.",
+            show_default="the last pose",
+        ),
+    ] = None,
     map_file: Annotated[
         Path | None,
         typer.Option("--map", metavar="FILE", help="ROS map (.yaml) or walls (.csv).", rich_help_panel=_WORLD),
     ] = None,
     along_trajectory: Annotated[
         bool,
-        typer.Option("--along-trajectory", help="No map: free is where the robot has been.", rich_help_panel=_WORLD),
+        typer.Option(
+            "--along-trajectory", metavar="", help="No map: free is where the robot has been.", rich_help_panel=_WORLD
+        ),
     ] = False,
     width: Annotated[
         float | None,
         typer.Option(
+            metavar="M",
             help="Metres that are free to each side of the trajectory.",
             show_default="twice its typical step",
             callback=_above_zero,
@@ -72,10 +132,13 @@ def plan(
         ),
     ] = None,
     unknown: Annotated[
-        Unknown, typer.Option(help="What unknown cells of a ROS map are taken for.", rich_help_panel=_WORLD)
+        Unknown,
+        typer.Option(metavar="WHAT", help="Unknown cells of a ROS map count as occupied or free.", rich_help_panel=_WORLD),
     ] = "occupied",
-    robot_radius: Annotated[float, typer.Option(help="Metres.", callback=_above_zero, rich_help_panel=_WORLD)] = 0.35,
-    candidates: Annotated[int, typer.Option(min=1, help="Paths to compare.", rich_help_panel=_CANDIDATES)] = 20,
+    robot_radius: Annotated[
+        float, typer.Option(metavar="M", help="Metres.", callback=_above_zero, rich_help_panel=_WORLD)
+    ] = 0.35,
+    candidates: Annotated[int, typer.Option(min=1, metavar="N", help="Paths to compare.", rich_help_panel=_CANDIDATES)] = 20,
     max_detour: Annotated[
         float | None,
         typer.Option(
@@ -86,46 +149,44 @@ def plan(
             rich_help_panel=_CANDIDATES,
         ),
     ] = None,
-    vertices: Annotated[int, typer.Option(min=2, help="Least size of the roadmap.", rich_help_panel=_CANDIDATES)] = 1000,
-    seed: Annotated[int, typer.Option(min=0, help="The same seed, the same paths.", rich_help_panel=_CANDIDATES)] = 0,
+    vertices: Annotated[
+        int, typer.Option(min=2, metavar="N", help="Least size of the roadmap.", rich_help_panel=_CANDIDATES)
+    ] = 1000,
+    seed: Annotated[
+        int, typer.Option(min=0, metavar="N", help="The same seed, the same paths.", rich_help_panel=_CANDIDATES)
+    ] = 0,
     spacing: Annotated[
-        float, typer.Option(help="Metres between new poses.", callback=_above_zero, rich_help_panel=_FACTORS)
+        float, typer.Option(metavar="M", help="Metres between new poses.", callback=_above_zero, rich_help_panel=_FACTORS)
     ] = 1.0,
     closure_radius: Annotated[
         float,
-        typer.Option(help="A loop closes within this distance, metres.", callback=_above_zero, rich_help_panel=_FACTORS),
+        typer.Option(
+            metavar="M",
+            help="A loop closes within this distance, metres.",
+            callback=_above_zero,
+            rich_help_panel=_FACTORS,
+        ),
     ] = 2.0,
     closure_angle: Annotated[
         float | None,
         typer.Option(
+            metavar="RAD",
             help="… and within this difference of headings, radians.",
             show_default="any",
-            callback=_above_zero,
+            callback=_angle,
             rich_help_panel=_FACTORS,
         ),
     ] = None,
     min_index_gap: Annotated[
         int | None,
-        typer.Option(min=2, help="… with a pose at least so many back.", show_default="5", rich_help_panel=_FACTORS),
-    ] = None,
-    line_of_sight: Annotated[
-        bool | None,
         typer.Option(
-            "--line-of-sight/--no-line-of-sight", help="… that is in sight.", show_default="yes", rich_help_panel=_FACTORS
+            min=2, metavar="N", help="… with a pose at least so many back.", show_default="5", rich_help_panel=_FACTORS
         ),
     ] = None,
-    paper: Annotated[
-        bool,
-        typer.Option(
-            "--paper",
-            help="The rules of the paper where not said otherwise: headings within 1 rad, index gap 2, "
-            "no line of sight, no detour limit.",
-            rich_help_panel=_FACTORS,
-        ),
-    ] = False,
     sigma_p: Annotated[
         float | None,
         typer.Option(
+            metavar="M",
             help="Noise of predicted positions, metres.",
             show_default="the graph's",
             callback=_above_zero,
@@ -135,65 +196,122 @@ def plan(
     sigma_theta: Annotated[
         float | None,
         typer.Option(
+            metavar="RAD",
             help="Noise of predicted headings, radians.",
             show_default="the graph's",
-            callback=_above_zero,
+            callback=_heading_noise,
             rich_help_panel=_FACTORS,
         ),
     ] = None,
-    objective: Annotated[
-        Objective,
+    line_of_sight: Annotated[
+        bool | None,
         typer.Option(
-            help="Entropy to minimise: of all poses (the paper's), of those that exist now, or per pose.",
+            "--line-of-sight/--no-line-of-sight",
+            metavar="",
+            help="A loop closes only with a pose in sight.",
+            show_default="yes",
+            rich_help_panel=_RULES,
+        ),
+    ] = None,
+    paper: Annotated[
+        bool,
+        typer.Option(
+            "--paper",
+            metavar="",
+            help="The rules of the paper where not said otherwise: headings within 1 rad, index gap 2, "
+            "no line of sight, no detour limit.",
+            rich_help_panel=_RULES,
+        ),
+    ] = False,
+    objective: Annotated[
+        str,
+        typer.Option(
+            callback=one_of(OBJECTIVES),
+            autocompletion=completed(OBJECTIVES),
+            metavar="NAME",
+            help="Entropy to minimise: joint, of all poses (the paper's); map, of those that exist now; or per_pose.",
             rich_help_panel=_DECISION,
         ),
     ] = "joint",
-    signature: Annotated[Signature, typer.Option(help="What ranks the paths.", rich_help_panel=_DECISION)] = "spanning_trees",
-    bounds: Annotated[
-        Family,
+    signature: Annotated[
+        str,
         typer.Option(
-            help="Family of bounds; the paper's needs equal noise, the anchored one numba; auto takes what proves for less.",
+            callback=one_of(SIGNATURES),
+            autocompletion=completed(SIGNATURES),
+            metavar="NAME",
+            help="What ranks the paths: spanning_trees, von_neumann or von_neumann_approx.",
             rich_help_panel=_DECISION,
         ),
-    ] = "fischer",
-    determinant: Annotated[
-        Determinant, typer.Option(help="In the lower bound: exact, or by its diagonal.", rich_help_panel=_DECISION)
-    ] = "cholesky",
+    ] = "spanning_trees",
     normalized: Annotated[
         bool,
-        typer.Option("--normalized", help="Add the noise to von_neumann_approx.", rich_help_panel=_DECISION),
+        typer.Option("--normalized", metavar="", help="Add the noise to von_neumann_approx.", rich_help_panel=_DECISION),
     ] = False,
     allow_dense_spectrum: Annotated[
         bool,
         typer.Option(
-            "--allow-dense-spectrum", help="Let von_neumann take its time on large graphs.", rich_help_panel=_DECISION
+            "--allow-dense-spectrum",
+            metavar="",
+            help="Let von_neumann take its time on large graphs.",
+            rich_help_panel=_DECISION,
         ),
     ] = False,
     margin: Annotated[
         float | None,
-        typer.Option(help="Entropy that is good enough, nats: no other path is bounded.", rich_help_panel=_DECISION),
-    ] = None,
-    proof: Annotated[
-        Proof,
         typer.Option(
-            help="Ranking alone, with bounds, or exact evaluations until the best is proven.", rich_help_panel=_DECISION
+            metavar="NATS",
+            help="Entropy that is good enough: no other path is bounded.",
+            rich_help_panel=_DECISION,
         ),
-    ] = "bounded",
-    max_evaluations: Annotated[
-        int | None, typer.Option(min=0, help="Stop the proof after so many.", rich_help_panel=_DECISION)
     ] = None,
     deadline: Annotated[
         float | None,
-        typer.Option(help="Seconds for the decision.", callback=_above_zero, rich_help_panel=_DECISION),
+        typer.Option(metavar="S", help="Seconds for the decision.", callback=_above_zero, rich_help_panel=_DECISION),
+    ] = None,
+    bounds: Annotated[
+        str,
+        typer.Option(
+            callback=one_of((*BOUNDS, AUTO)),
+            autocompletion=completed((*BOUNDS, AUTO)),
+            metavar="NAME",
+            help="Family of bounds: fischer; fischer_step, tighter; paper, for equal noise; anchored and chain, tightest; "
+            "auto, what proves for less.",
+            rich_help_panel=_PROOF,
+        ),
+    ] = "fischer",
+    determinant: Annotated[
+        Determinant,
+        typer.Option(
+            metavar="NAME",
+            help="In the lower bound: cholesky, exact; or hadamard, by its diagonal.",
+            rich_help_panel=_PROOF,
+        ),
+    ] = "cholesky",
+    proof: Annotated[
+        Proof,
+        typer.Option(
+            metavar="NAME",
+            help="none, ranking alone; bounded; or optimal, exact evaluations until the best is proven.",
+            rich_help_panel=_PROOF,
+        ),
+    ] = "bounded",
+    max_evaluations: Annotated[
+        int | None,
+        typer.Option(min=0, metavar="N", help="Most exact evaluations for the proof.", rich_help_panel=_PROOF),
     ] = None,
     optimize: Annotated[
         bool,
-        typer.Option("--optimize/--no-optimize", help="Find the maximum-likelihood poses first.", rich_help_panel=_DECISION),
+        typer.Option(
+            "--optimize/--no-optimize",
+            metavar="",
+            help="Find the maximum-likelihood poses first.",
+        ),
     ] = True,
     exact: Annotated[
         bool,
         typer.Option(
             "--exact/--no-exact",
+            metavar="",
             help="Evaluate every path for the picture of the bounds, as far as a few seconds go.",
             rich_help_panel=_OUTPUT,
         ),
@@ -208,8 +326,14 @@ def plan(
         ),
     ] = None,
     as_json: Annotated[
-        bool, typer.Option("--json", help="Print the decision as JSON and nothing else.", rich_help_panel=_OUTPUT)
+        bool,
+        typer.Option("--json", metavar="", help="Print the decision as JSON and nothing else.", rich_help_panel=_OUTPUT),
     ] = False,
+    drop: Drop = None,
+    robust_as_plain: RobustAsPlain = False,
+    edge2_order: Edge2OrderOption = "toro",
+    component: Component = "all",
+    planar: Planar = False,
 ) -> None:
     """Choose the best path to a goal on a pose-graph map.
 
@@ -238,18 +362,26 @@ def plan(
         line_of_sight=line_of_sight if line_of_sight is not None else not paper,
         information=plan_stages.information(sigma_p, sigma_theta),
     )
-    graph = plan_stages.read_graph(graph_file, reporter, optimized=optimize)
-    world = plan_stages.read_world(map_file, graph, reporter, width=width, unknown=unknown)
-    planner = Planner(
-        graph,
-        objective=objective,
-        signature=signature,
-        bounds=bounds,
-        determinant=determinant,
-        normalized=normalized,
-        allow_dense_spectrum=allow_dense_spectrum,
+    reading = reading_options(
+        drop, robust_as_plain=robust_as_plain, edge2_order=edge2_order, component=component, planar=planar
     )
-    found = plan_stages.find_candidates(graph, world, goal, rule, reporter)
+    graph = plan_stages.read_graph(graph_file, reporter, optimized=optimize, reading=reading)
+    world = plan_stages.read_world(map_file, graph, reporter, width=width, unknown=unknown)
+    begin = plan_stages.choose_start(
+        graph, world, reporter, pose_id=start.pose_id if start else None, place=start.place if start else None
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NotOptimizedWarning)  # `read_graph` has told
+        planner = Planner(
+            graph,
+            objective=objective,
+            signature=signature,
+            bounds=bounds,
+            determinant=determinant,
+            normalized=normalized,
+            allow_dense_spectrum=allow_dense_spectrum,
+        )
+    found = plan_stages.find_candidates(graph, world, begin, goal, rule, reporter)
     with reporter.stage("decision") as update:
         decision = planner.decide(
             found.actions,
@@ -259,9 +391,20 @@ def plan(
             deadline=deadline,
             on_progress=lambda _, done, total: update(done, total),
         )
-    plan_stages.say_decision(decision, reporter)
+    plan_stages.say_decision(decision, rule, reporter, along_trajectory=along_trajectory)
     entropies = plan_stages.exact_entropies(planner, found.actions, decision, reporter, wanted=exact and folder is not None)
-    result = plan_files.PlanResult(graph, world, found, decision, entropies, goal=goal, rule=rule, options=context.params)
+    result = plan_files.PlanResult(
+        graph=graph,
+        world=world,
+        start=begin,
+        candidates=found,
+        decision=decision,
+        entropies=entropies,
+        goal=goal,
+        rule=rule,
+        options=context.params,
+        notes=reporter.notes,
+    )
     if folder is not None:
         plan_files.write(folder, result, reporter)
     reporter.answer(plan_files.document(result))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
@@ -14,7 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from topobelief.arrays import FloatArray
+from topobelief.candidates.polyline import path_length, path_poses
+from topobelief.candidates.start import Start
 from topobelief.cli.console import Reporter
+from topobelief.cli.plan import GivenStart
 from topobelief.cli.plan_stages import CandidateRule, Candidates
 from topobelief.errors import FileError
 from topobelief.graph.pose_graph import PoseGraph
@@ -29,12 +32,14 @@ class PlanResult:
 
     graph: PoseGraph
     world: World
+    start: Start
     candidates: Candidates
     decision: Decision
     entropies: FloatArray  # (K,): exact values, whether or not the decision needed them; nan where unknown
     goal: tuple[float, float]
     rule: CandidateRule
     options: Mapping[str, object]  # as given, what the rule settles aside
+    notes: Sequence[str]
 
 
 def checked_folder(folder: Path | None) -> Path | None:
@@ -59,7 +64,8 @@ def checked_folder(folder: Path | None) -> Path | None:
 
 def document(result: PlanResult) -> dict[str, object]:
     """The decision (`Decision.from_dict` reads it), with the paths and all that repeats the plan."""
-    decision, graph = result.decision, result.graph
+    decision, graph, start = result.decision, result.graph, result.start
+    best = result.candidates.paths[decision.best]
     plain = decision.to_dict()
     exact = [value if math.isfinite(value) else None for value in result.entropies.tolist()]
     described = zip(plain["actions"], result.candidates.paths, exact, strict=True)
@@ -67,9 +73,17 @@ def document(result: PlanResult) -> dict[str, object]:
     return {
         **plain,
         "actions": actions,
+        "chosen": {
+            "index": decision.best,
+            "label": decision.name(decision.best),
+            "length": path_length(best),
+            "x_y_yaw": path_poses(best).tolist(),
+        },
+        "notes": list(result.notes),
         "topobelief": version("topobelief"),
         "graph": {"num_poses": graph.num_poses, "num_edges": graph.num_edges, "chi2": graph.chi2},
-        "start": graph.poses[-1].tolist(),
+        "start": (start.place if start.distance(graph) else graph.poses[start.pose]).tolist(),
+        "start_pose": {"index": start.pose, "id": int(graph.ids[start.pose])},
         "goal": list(result.goal),
         "options": {name: _plain(value) for name, value in {**result.options, **asdict(result.rule)}.items()},
     }
@@ -81,33 +95,43 @@ def _plain(value: object) -> object:
         return None
     if isinstance(value, np.ndarray):
         return value.tolist()
-    return str(value) if isinstance(value, Path) else value
+    return str(value) if isinstance(value, Path | GivenStart) else value
 
 
 def write(folder: Path, result: PlanResult, reporter: Reporter) -> None:
     """Draw and write everything, and say where it is and how long all took."""
+    text = json.dumps(document(result), indent=2, allow_nan=False) + "\n"
+    writers: dict[str, Callable[[Path], object]] = {"decision.json": lambda path: path.write_text(text, encoding="utf-8")}
     with reporter.stage("pictures"):
-        from topobelief.report.bounds_figure import draw_bounds
-        from topobelief.report.canvas import save_figure
-        from topobelief.report.paths_figure import draw_paths
-
-        candidates, decision = result.candidates, result.decision
-        paths = draw_paths(result.graph, result.world, candidates.paths, candidates.actions, decision, goal=result.goal)
-        bounds = draw_bounds(decision, result.entropies)
-        text = json.dumps(document(result), indent=2, allow_nan=False) + "\n"
-        write_together(
-            folder,
-            {
-                "paths.png": lambda path: save_figure(paths, path),
-                "bounds.png": lambda path: save_figure(bounds, path),
-                "decision.json": lambda path: path.write_text(text, encoding="utf-8"),
-            },
-        )
+        try:
+            writers |= _pictures(result)
+        finally:  # a picture that fails does not cost the decision
+            write_together(folder, writers)
     reporter.say(
         "",
         f"Pictures: {folder / 'paths.png'} and {folder / 'bounds.png'}; decision: {folder / 'decision.json'}",
         f"Took {reporter.time_taken()}",
     )
+
+
+def _pictures(result: PlanResult) -> dict[str, Callable[[Path], object]]:
+    """What writes each picture."""
+    from topobelief.report.bounds_figure import draw_bounds
+    from topobelief.report.canvas import save_figure
+    from topobelief.report.paths_figure import draw_paths
+
+    candidates, decision = result.candidates, result.decision
+    paths = draw_paths(
+        result.graph,
+        result.world,
+        candidates.paths,
+        candidates.actions,
+        decision,
+        goal=result.goal,
+        start=result.start,
+    )
+    bounds = draw_bounds(decision, result.entropies)
+    return {"paths.png": lambda path: save_figure(paths, path), "bounds.png": lambda path: save_figure(bounds, path)}
 
 
 def write_together(folder: Path, writers: Mapping[str, Callable[[Path], object]]) -> None:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
-# The planner's own choices, repeated so that help need not load it; a test holds them together.
-Objective = Literal["joint", "map", "per_pose"]
+from topobelief.cli.choices import completed, one_of
+from topobelief.planning.registry import OBJECTIVES
 
 _SCENARIO_HELP = "office, lab, corridors, or a .yaml of your own."
 _NOISE_HELP = 'physical; or injected: the ratio ξ = σ_θ/σ_p at σ_p = 0.1 m, such as 0.35, or "σ_p,σ_θ" in m and rad.'
@@ -24,7 +24,12 @@ def simulate(
         ),
     ] = "spanning_trees",
     objective: Annotated[
-        Objective, typer.Option(help="Entropy to minimise: of all poses (the paper's), of those that exist now, or per pose.")
+        str,
+        typer.Option(
+            callback=one_of(OBJECTIVES),
+            autocompletion=completed(OBJECTIVES),
+            help="Entropy to minimise: of all poses (the paper's), of those that exist now, or per pose.",
+        ),
     ] = "joint",
     seed: Annotated[int, typer.Option(min=0, help="The same seed, the same run.")] = 0,
     noise: Annotated[str, typer.Option(help=_NOISE_HELP)] = "physical",
@@ -74,6 +79,8 @@ def simulate(
         if displaced and not resume:
             raise InvalidInputError("expected --displaced together with --resume, got it alone")
         place = with_detour(scenario_of(scenario), max_detour)
+        if place.caution:
+            reporter.warn(place.caution)
         options = RunOptions(
             strategy=checked_strategy(strategy),
             objective=objective,
@@ -111,7 +118,9 @@ def simulate_compare(
     strategies: Annotated[str, typer.Option(help="By commas; the first is what the others are compared with.")] = (
         "shortest,spanning_trees"
     ),
-    objective: Annotated[Objective, typer.Option(help="As for simulate.")] = "joint",
+    objective: Annotated[
+        str, typer.Option(callback=one_of(OBJECTIVES), autocompletion=completed(OBJECTIVES), help="As for simulate.")
+    ] = "joint",
     seeds: Annotated[int, typer.Option(min=1, help="How many, from 0 on.")] = 20,
     noise: Annotated[str, typer.Option(help="Injected, as for simulate; redrawn for each recorded graph.")] = "0.35",
     redraws: Annotated[int, typer.Option(min=1, help="Of the noise, for each recorded graph.")] = 50,
@@ -144,6 +153,7 @@ def simulate_compare(
         from topobelief.cli import comparison_files
         from topobelief.cli.plan_files import checked_folder
         from topobelief.errors import InvalidInputError
+        from topobelief.experiments.scenario_file import scenario_of
         from topobelief.experiments.strategy_comparison import ComparisonTask
         from topobelief.report.simulation_tables import comparison_table
         from topobelief.simulation.comparison import summarised
@@ -157,6 +167,9 @@ def simulate_compare(
             raise InvalidInputError("expected injected noise to redraw, got physical noise, of which there is one draw a run")
         folder = out or Path("out") / f"compare-{Path(scenario).stem}"
         checked_folder(folder)
+        caution = scenario_of(scenario).caution
+        if caution:
+            reporter.warn(caution)
         task = ComparisonTask(
             scenario=scenario,
             max_detour=max_detour,

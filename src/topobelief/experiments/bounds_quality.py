@@ -15,12 +15,10 @@ from topobelief.bounds.entropy_bounds import Determinant
 from topobelief.bounds.paper import require_equal_noise
 from topobelief.errors import InvalidGraphError
 from topobelief.graph.action import Action, posterior
-from topobelief.graph.fisher import fisher_rows
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.planning.objectives import ObjectiveName
-from topobelief.planning.planner import BoundsName, Planner
+from topobelief.planning.planner import Planner
 
-FAMILIES: tuple[tuple[str, BoundsName, Determinant], ...] = (
+FAMILIES: tuple[tuple[str, str, Determinant], ...] = (
     ("paper, Hadamard", "paper", "hadamard"),
     ("paper", "paper", "cholesky"),
     ("Fischer, Hadamard", "fischer", "hadamard"),
@@ -74,7 +72,7 @@ def bounds_rows(
     seed: int,
     graph: PoseGraph,
     actions: Sequence[Action],
-    objectives: Sequence[ObjectiveName],
+    objectives: Sequence[str],
 ) -> list[BoundsRow]:
     """Every family that covers the noise, for each objective."""
     rows: list[BoundsRow] = []
@@ -106,7 +104,7 @@ def bounds_rows(
 
 def _has_equal_noise(graph: PoseGraph) -> bool:
     try:
-        require_equal_noise(fisher_rows(graph))
+        require_equal_noise(graph.information)
     except InvalidGraphError:
         return False
     return True

@@ -23,8 +23,7 @@ from topobelief.candidates.predicted_factors import predict_actions
 from topobelief.candidates.roadmap import Roadmap, build_roadmap
 from topobelief.graph.action import Action, posterior
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.planning.objectives import ObjectiveName
-from topobelief.planning.planner import BoundsName, Planner
+from topobelief.planning.planner import Planner
 from topobelief.simulation.scenario import Goal, Place, named_scenario
 from topobelief.world import World
 
@@ -35,7 +34,7 @@ SIGMA_POSITION = 0.1
 """Metres."""
 NOISES = (0.1, 0.35, 0.85)
 """xi = sigma_theta / sigma_p, rad/m."""
-OBJECTIVES: tuple[ObjectiveName, ...] = ("joint", "map", "per_pose")
+OBJECTIVES: tuple[str, ...] = ("joint", "map", "per_pose")
 
 _CLOSURE_RADIUS, _CLOSURE_ANGLE, _MIN_INDEX_GAP, _SPACING = 2.0, 1.0, 2, 1.0  # m, rad, poses, m
 
@@ -158,7 +157,7 @@ def office_session(name: SessionName, seed: int, xi: float, *, num_paths: int | 
 def _session(
     name: SessionName, seed: int, xi: float, graph: PoseGraph, world: World, start: Place, goal: Goal, num_paths: int | None
 ) -> PlanningSession:
-    roadmap, paths = _routes(name, seed, start, goal.place, goal.num_paths if num_paths is None else num_paths)
+    roadmap, paths = _routes(seed, start, goal.place, goal.num_paths if num_paths is None else num_paths)
     actions = predict_actions(
         graph,
         paths,
@@ -172,7 +171,7 @@ def _session(
 
 
 @lru_cache(maxsize=4)  # sessions that differ in noise alone share their paths
-def _routes(name: SessionName, seed: int, start: Place, goal: Place, num_paths: int) -> tuple[Roadmap, tuple[FloatArray, ...]]:
+def _routes(seed: int, start: Place, goal: Place, num_paths: int) -> tuple[Roadmap, tuple[FloatArray, ...]]:
     scenario = named_scenario("office")
     roadmap = build_roadmap(scenario.world, start, goal, scenario.rule.num_vertices, scenario.rule.robot_radius, seed)
     return roadmap, tuple(diverse_paths(roadmap, start, goal, num_paths, None, seed))
@@ -190,7 +189,7 @@ def action_rows(session: PlanningSession) -> list[ActionRow]:
         "map_spanning_trees": Planner(graph, objective="map"),
     }
     columns = {name: planner.decide(actions, proof="none").signatures for name, planner in signatures.items()}
-    families: tuple[BoundsName, ...] = ("paper", "fischer", "anchored")
+    families: tuple[str, ...] = ("paper", "fischer", "anchored")
     for family in families:
         decision = Planner(graph, bounds=family).decide(actions)
         columns[f"{family}_lower"], columns[f"{family}_upper"] = decision.lower, decision.upper

@@ -18,7 +18,6 @@ from topobelief.estimation import optimize
 from topobelief.experiments.benchmark.sessions import BenchmarkSession, candidate_paths
 from topobelief.experiments.bounds_quality import BoundsRow, bounds_rows
 from topobelief.io.formats import read_pose_graph
-from topobelief.planning.evaluation import SignatureName
 from topobelief.planning.planner import Planner
 
 
@@ -77,7 +76,7 @@ def real_action_rows(path: Path, num_actions: int, seed: int, *, largest_spectru
     session = real_decision(path, num_actions, seed)
     graph, actions = session.graph, session.actions
 
-    def signature(name: SignatureName) -> FloatArray:
+    def signature(name: str) -> FloatArray:
         if name == "von_neumann" and graph.num_poses > largest_spectrum:
             return np.full(len(actions), math.nan)
         return Planner(graph, signature=name).decide(actions, proof="none").signatures

@@ -6,9 +6,9 @@
     goals: [[26, 8], [25, -2.95]]
     candidates: [9, 20]           # paths to compare, one number or one a goal
     max_detour: 1.3               # none for no limit
-    robot_radius: 0.35            # metres, with which paths are planned
+    robot_radius: 0.35            # metres that paths keep from walls; default: the chassis and 0.1 m
     lidar: {max_range: 10, range_noise: 0.01}
-    robot: {wheel_slip: 0.02}
+    robot: {radius: 0.25, wheel_slip: 0.02}
 
 Only map, start and goals must be given.
 """
@@ -26,7 +26,7 @@ from topobelief.io.ros_map import Unknown
 from topobelief.io.yaml_fields import Field, read_fields
 from topobelief.simulation.lidar import LidarSettings
 from topobelief.simulation.robot_settings import RobotSettings
-from topobelief.simulation.scenario import SCENARIO_NAMES, CandidateRule, Goal, Scenario, named_scenario
+from topobelief.simulation.scenario import SAFE_MARGIN, SCENARIO_NAMES, CandidateRule, Goal, Scenario, named_scenario
 
 _Settings = TypeVar("_Settings", RobotSettings, LidarSettings)
 
@@ -81,8 +81,8 @@ def read_scenario(path: Path) -> Scenario:
     unknown = cast("Unknown", keys["unknown"].choice(get_args(Unknown))) if "unknown" in keys else "occupied"
     start = keys["start"].numbers(2, 3, expected="a start [x, y] or [x, y, theta]")
     goals = _goals(keys["goals"], keys.get("candidates"))
-    rule = _rule(keys)
     robot = _settings(keys.get("robot"), RobotSettings())
+    rule = _rule(keys, chassis=robot.radius)
     lidar = _settings(keys.get("lidar"), LidarSettings())
     try:
         return Scenario(
@@ -110,14 +110,21 @@ def _goals(field: Field, candidates: Field | None) -> tuple[Goal, ...]:
     return tuple(Goal((x, y), count) for (x, y), count in zip(places, counts, strict=True))
 
 
-def _rule(keys: Mapping[str, Field]) -> CandidateRule:
-    rule = CandidateRule()
+def _rule(keys: Mapping[str, Field], *, chassis: float) -> CandidateRule:
+    rule = CandidateRule(robot_radius=chassis + SAFE_MARGIN)
     if "max_detour" in keys:
         field = keys["max_detour"]
         unlimited = field.text(expected="a number of at least 1, or none for no limit").lower() == "none"
         rule = dataclasses.replace(rule, max_detour=None if unlimited else field.number(at_least=1))
     if "robot_radius" in keys:
-        rule = dataclasses.replace(rule, robot_radius=keys["robot_radius"].number(above=0))
+        field = keys["robot_radius"]
+        radius = field.number(above=0)
+        if radius < chassis:
+            field.refuse(
+                f"at least the radius of the chassis, {chassis:g} m",
+                f"{radius:g}; raise it, or make the chassis smaller by robot: {{radius: ...}}",
+            )
+        rule = dataclasses.replace(rule, robot_radius=radius)
     return rule
 
 

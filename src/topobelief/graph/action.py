@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from topobelief.arrays import FloatArray, IntArray, frozen_floats, frozen_ints
+from topobelief.arrays import FloatArray, IntArray, ReadOnlyArrays, frozen_floats, frozen_ints
 from topobelief.errors import InvalidActionError, InvalidInputError
 from topobelief.graph.information import checked_information
 from topobelief.graph.pose_graph import PoseGraph, checked_pose_rows
@@ -20,7 +20,7 @@ from topobelief.graph.topology import Topology
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class Action:
+class Action(ReadOnlyArrays):
     """New poses and the factors among them and to the graph.
 
     Parameters
@@ -35,6 +35,8 @@ class Action:
         What a person calls the action.
     cost
         A deterministic cost (length, energy, time), in nats; it adds to the entropy and to its bounds.
+    length
+        How far the robot drives, metres; it is told and has no influence. Default: from pose to pose (`driven_lengths`).
 
     Raises
     ------
@@ -47,6 +49,7 @@ class Action:
     information: FloatArray
     label: str
     cost: float
+    length: float | None
 
     def __init__(
         self,
@@ -56,6 +59,7 @@ class Action:
         *,
         label: str = "",
         cost: float = 0.0,
+        length: float | None = None,
     ) -> None:
         try:
             raw_information = frozen_floats(information, name="information")
@@ -81,12 +85,15 @@ class Action:
             raise InvalidActionError("expected indices from 0, got a negative one", edge=int(negative[0]), label=label)
         if not np.isfinite(cost):
             raise InvalidActionError(f"expected a finite cost in nats, got {cost}", label=label)
+        if length is not None and not (0 <= length < np.inf):
+            raise InvalidActionError(f"expected a length of at least 0 m, got {length}", label=label)
         for name, value in (
             ("poses", checked_poses),
             ("edges", checked_edges),
             ("information", checked),
             ("label", label),
             ("cost", float(cost)),
+            ("length", None if length is None else float(length)),
         ):
             object.__setattr__(self, name, value)
 
@@ -192,6 +199,23 @@ def _all_fit(graph: PoseGraph, actions: Sequence[Action]) -> bool:
     return bool((labels == labels[0]).all())
 
 
+def driven_lengths(graph: PoseGraph, actions: Sequence[Action]) -> list[float]:
+    """How far the robot drives in each action, metres: as the action says or, where it does not, along its new poses.
+
+    Those are taken in their order, from the old pose that the first of them is joined to by the earliest such edge.
+    """
+    return [_length_from_pose_to_pose(graph, action) if action.length is None else action.length for action in actions]
+
+
+def _length_from_pose_to_pose(graph: PoseGraph, action: Action) -> float:
+    if action.num_new_poses == 0:
+        return 0.0
+    low, high = np.sort(action.edges, axis=1).T
+    start = low[(low < graph.num_poses) & (high == graph.num_poses)][:1]  # empty where only later poses hang on the graph
+    path = np.concatenate([graph.positions[start], graph.group.position(action.poses)])
+    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+
+
 def posterior(graph: PoseGraph, action: Action) -> PoseGraph:
     """The graph after the action: the from-scratch reference for everything incremental.
 
@@ -218,7 +242,7 @@ def posterior(graph: PoseGraph, action: Action) -> PoseGraph:
     poses = np.concatenate([graph.poses, action.poses]) if action.num_new_poses else graph.poses
     i, j = action.edges.T
     predicted = graph.group.between(poses[i], poses[j])
-    new_ids = int(graph.ids.max()) + 1 + np.arange(action.num_new_poses)
+    new_ids = _new_ids(graph.ids, action.num_new_poses)
     return PoseGraph._from_checked(  # pyright: ignore[reportPrivateUsage]  (the two modules are one room)
         Topology(len(poses), np.concatenate([graph.edges, action.edges])),
         poses,
@@ -227,3 +251,11 @@ def posterior(graph: PoseGraph, action: Action) -> PoseGraph:
         np.concatenate([graph.ids, new_ids]),
         graph.fixed,
     )
+
+
+def _new_ids(ids: IntArray, count: int) -> IntArray:
+    """Ids of new poses: those after the largest or, where there is no room, the smallest that are free."""
+    largest = int(ids.max())
+    if largest < 2**63 - 1 - count:
+        return largest + 1 + np.arange(count)
+    return np.setdiff1d(np.arange(len(ids) + count), ids)[:count]

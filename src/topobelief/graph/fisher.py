@@ -22,7 +22,7 @@ from topobelief.geometry import Group
 from topobelief.graph.information import SAME_NOISE, isotropic_weights, shared_information
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg.edge_form import EdgeForm, laplacian_form
-from topobelief.linalg.log_det import UNIT_ROUNDOFF
+from topobelief.linalg.estimate import UNIT_ROUNDOFF
 
 _may_overflow = np.errstate(over="ignore", invalid="ignore")  # log-determinants of what is not finite are refused
 
@@ -36,7 +36,7 @@ class FisherRows:
     root: FloatArray  # (m, kappa, kappa): U turned into the world frame, Omega_world = root^T root
     lever: FloatArray  # (m, k, q): C(d)
     row_scale: FloatArray  # (m, 2): root of the traces of O_pp and O_rr, which bound every entry of Omega_world
-    root_error: float
+    root_errors: FloatArray  # (m,): what rounding in the root adds to the error of a log-determinant, nats
     weights: tuple[FloatArray, FloatArray] | None  # (w_p, w_r) where all noise is block-isotropic
 
     @_may_overflow
@@ -49,7 +49,7 @@ class FisherRows:
         magnitude_j = np.concatenate([np.repeat(scale_p, k, 1), np.repeat(scale_r, self.group.rotation_dim, 1)], axis=1)
         magnitude_i = magnitude_j.copy()
         magnitude_i[:, k:] += scale_p * np.sqrt(self.squared_lengths())[:, None]
-        return EdgeForm(self.edges, rows_i, root, magnitude_i, magnitude_j, self.root_error, gauge_free=True)
+        return EdgeForm(self.edges, rows_i, root, magnitude_i, magnitude_j, self.root_errors, gauge_free=True)
 
     def positions(self) -> EdgeForm:
         """I_pp: the positions with all rotations held; a scalar Laplacian w_p L where the noise allows."""
@@ -58,7 +58,7 @@ class FisherRows:
             return laplacian_form(self.edges, self.weights[0], multiplicity=k)
         root = self.root[:, :k, :k]
         magnitude = np.repeat(self.row_scale[:, :1], k, 1)
-        return EdgeForm(self.edges, -root, root, magnitude, magnitude, self.root_error, gauge_free=True)
+        return EdgeForm(self.edges, -root, root, magnitude, magnitude, self.root_errors, gauge_free=True)
 
     @_may_overflow
     def rotations(self) -> EdgeForm:
@@ -72,7 +72,7 @@ class FisherRows:
             rows_i += self.root[:, :, :k] @ self.lever
         magnitude_j = np.repeat(self.row_scale[:, 1:], q, 1)
         magnitude_i = magnitude_j + (self.row_scale[:, 0] * np.sqrt(self.squared_lengths()))[:, None]
-        return EdgeForm(self.edges, rows_i, rows_j, magnitude_i, magnitude_j, self.root_error)
+        return EdgeForm(self.edges, rows_i, rows_j, magnitude_i, magnitude_j, self.root_errors)
 
     def rotations_given_positions(self) -> EdgeForm:
         """L_r|p: the Laplacian with weights O_r|p; scalar, w_r L, where the noise allows."""
@@ -81,7 +81,7 @@ class FisherRows:
             return laplacian_form(self.edges, self.weights[1], multiplicity=q)
         root = self.root[:, k:, k:]
         magnitude = np.repeat(self.row_scale[:, 1:], q, 1)
-        return EdgeForm(self.edges, -root, root, magnitude, magnitude, self.root_error, gauge_free=True)
+        return EdgeForm(self.edges, -root, root, magnitude, magnitude, self.root_errors, gauge_free=True)
 
     def joined(self, more: FisherRows) -> FisherRows:
         """These edges and then the others', of the same nodes."""
@@ -97,7 +97,7 @@ class FisherRows:
             np.concatenate([self.root, more.root]),
             np.concatenate([self.lever, more.lever]),
             np.concatenate([self.row_scale, more.row_scale]),
-            self.root_error + more.root_error,
+            np.concatenate([self.root_errors, more.root_errors]),
             weights,
         )
 
@@ -127,7 +127,7 @@ def fisher_rows(graph: PoseGraph, *, first_edge: int = 0) -> FisherRows:
         root = np.zeros(information.shape)
         axes = np.arange(kappa)
         root[:, axes, axes] = np.sqrt(diagonal)
-        root_error = 0.0
+        root_errors = np.zeros(len(edges))
     else:
         upper = np.linalg.cholesky(information).transpose(0, 2, 1)
         rotation = graph.group.rotation_matrix(graph.poses[j])
@@ -136,23 +136,23 @@ def fisher_rows(graph: PoseGraph, *, first_edge: int = 0) -> FisherRows:
         if group.rotation_dim == k:
             turn[:, k:, k:] = turn[:, :k, :k]
         root = upper @ turn
-        root_error = _root_error(information)
+        root_errors = _root_errors(information)
     traces = np.stack([diagonal[:, :k].sum(axis=1), diagonal[:, k:].sum(axis=1)], axis=1)
-    return FisherRows(group, edges, root, group.lever(offset), np.sqrt(traces), root_error, weights)
+    return FisherRows(group, edges, root, group.lever(offset), np.sqrt(traces), root_errors, weights)
 
 
-def _root_error(information: FloatArray) -> float:
-    """What rounding in the roots of the noise adds to the error of a log-determinant, nats.
+def _root_errors(information: FloatArray) -> FloatArray:
+    """What rounding in the root of each edge's noise adds to the error of a log-determinant, nats, shape (m,).
 
     A root is that of Omega + E with |E_ij| <= kappa u sqrt(Omega_ii Omega_jj), which moves ln |Omega| by tr(Omega^-1 E).
     """
     if shared_information(information) is not None:
-        return len(information) * _root_error_terms(information[:1])
+        return np.repeat(_root_error_terms(information[:1]), len(information))
     return _root_error_terms(information)
 
 
-def _root_error_terms(information: FloatArray) -> float:
+def _root_error_terms(information: FloatArray) -> FloatArray:
     scale = 1 / np.sqrt(np.diagonal(information, axis1=1, axis2=2))
     inverse = np.linalg.inv(information * scale[:, :, None] * scale[:, None, :])
     deviations = np.sqrt(np.abs(np.diagonal(inverse, axis1=1, axis2=2)))
-    return UNIT_ROUNDOFF * information.shape[-1] * float(np.sum(deviations.sum(axis=1) ** 2))
+    return UNIT_ROUNDOFF * information.shape[-1] * deviations.sum(axis=1) ** 2

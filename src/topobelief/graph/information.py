@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from topobelief.arrays import FloatArray, frozen_floats
+from topobelief.arrays import BoolArray, FloatArray, frozen_floats, read_only
 from topobelief.errors import InvalidGraphError
 
 _SPLITS = {3: (2, 1), 6: (3, 3)}
@@ -55,31 +55,40 @@ def checked_information(information: ArrayLike, *, num_edges: int, tangent_dim: 
     return _symmetric(array)
 
 
+def positive_definite(information: FloatArray) -> BoolArray:
+    """Which of some finite symmetric matrices are positive definite to rounding, whatever the units; shape (num_edges,)."""
+    definite: BoolArray = np.asarray((np.diagonal(information, axis1=1, axis2=2) > 0).all(axis=1))
+    smallest = np.linalg.eigvalsh(_scaled(information[definite]))[:, 0]
+    definite[definite] = smallest > np.finfo(float).eps * information.shape[1]
+    return definite
+
+
+def _scaled(information: FloatArray) -> FloatArray:
+    """Matrices of positive diagonals brought to diagonals of ones."""
+    scale = 1 / np.sqrt(np.diagonal(information, axis1=1, axis2=2))
+    return information * scale[:, :, None] * scale[:, None, :]
+
+
 def _symmetric(matrices: FloatArray) -> FloatArray:
     """The mean of each matrix and its transpose, where they differ in the last digits."""
     transposed = np.swapaxes(matrices, -1, -2)
     if np.array_equal(matrices, transposed):
         return matrices
-    mean = (matrices + transposed) / 2
-    mean.flags.writeable = False
-    return mean
+    return read_only((matrices + transposed) / 2)
 
 
 def _require_positive_definite(information: FloatArray) -> None:
     not_finite = np.flatnonzero(~np.isfinite(information).all(axis=(1, 2)))
     if not_finite.size:
         raise InvalidGraphError(f"expected a finite information matrix, got nan or inf at edge {not_finite[0]}")
-    diagonal = np.diagonal(information, axis1=1, axis2=2)
-    flat = np.flatnonzero(~(diagonal > 0).all(axis=1))
-    if flat.size == 0:
-        scale = 1 / np.sqrt(diagonal)
-        scaled = information * scale[:, :, None] * scale[:, None, :]
+    if (np.diagonal(information, axis1=1, axis2=2) > 0).all():
+        scaled = _scaled(information)
         asymmetric = np.flatnonzero(
             np.abs(scaled - scaled.transpose(0, 2, 1)).max(axis=(1, 2), initial=0.0) > _SYMMETRY_TOLERANCE
         )
         if asymmetric.size:
             raise InvalidGraphError(f"expected a symmetric information matrix, got an asymmetric one at edge {asymmetric[0]}")
-        flat = np.flatnonzero(np.linalg.eigvalsh(scaled)[:, 0] <= np.finfo(float).eps * information.shape[1])
+    flat = np.flatnonzero(~positive_definite(information))
     if flat.size:
         raise InvalidGraphError(
             f"expected a positive definite information matrix, got an indefinite or singular one at edge {flat[0]}"
@@ -100,6 +109,7 @@ def _repeats_one(information: FloatArray) -> bool:
     return len(information) > 1 and bool(information.strides[0] == 0 or (information == information[0]).all())
 
 
+@np.errstate(over="ignore")  # entries of a matrix may be further apart than the range of numbers
 def isotropic_weights(information: FloatArray) -> tuple[FloatArray, FloatArray] | None:
     """(w_p, w_r), each of shape (num_edges,), where every Omega is blkdiag(w_p I_k, w_r I_q); None elsewhere."""
     if _repeats_one(information):

@@ -13,15 +13,17 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from topobelief.arrays import FloatArray, IntArray, frozen_floats, frozen_ints
+from topobelief.arrays import FloatArray, IntArray, ReadOnlyArrays, frozen_floats, frozen_ints, read_only
 from topobelief.errors import InvalidGraphError
 from topobelief.geometry import Group, group_of_size
 from topobelief.graph.information import checked_information
 from topobelief.graph.topology import Topology
 
+_LARGEST_ID_JUMP = 100  # times the usual step of ids: what lies further on is a tag, a landmark or another robot
+
 
 @dataclass(frozen=True, eq=False, init=False)
-class PoseGraph:
+class PoseGraph(ReadOnlyArrays):
     """A pose graph; immutable, its arrays read-only.
 
     Parameters
@@ -83,8 +85,7 @@ class PoseGraph:
             raise InvalidGraphError('expected every kind to be "pose"; landmarks are not supported')
         if measurements is None:
             i, j = topology.edges.T
-            checked_measurements = group.between(checked_poses[i], checked_poses[j])
-            checked_measurements.flags.writeable = False
+            checked_measurements = read_only(group.between(checked_poses[i], checked_poses[j]))
         else:
             checked_measurements, _ = checked_pose_rows(
                 measurements, name="measurements", size=group.pose_size, count=topology.num_edges
@@ -121,9 +122,7 @@ class PoseGraph:
         graph = object.__new__(cls)
         fields = {"topology": topology, "edges": topology.edges, "poses": poses, "measurements": measurements}
         for name, value in (fields | {"information": information, "ids": ids, "fixed": fixed}).items():
-            if isinstance(value, np.ndarray):
-                value.flags.writeable = False
-            object.__setattr__(graph, name, value)
+            object.__setattr__(graph, name, read_only(value) if isinstance(value, np.ndarray) else value)
         return graph
 
     @property
@@ -155,6 +154,27 @@ class PoseGraph:
     def degrees_of_freedom(self) -> int:
         """kappa (m - (n - 1)): measured numbers beyond those that fix the free poses."""
         return self.tangent_dim * (self.num_edges - self.num_poses + 1)
+
+    @cached_property
+    def odometry_end(self) -> int | None:
+        """Index of the pose where the robot is, as far as the graph says; None where no edge joins a pose to the next.
+
+        The chain of odometry begins at the first pose that an edge joins to the next one, and goes on for as long as an edge
+        joins each pose to the next. A pose whose id jumps by more than 100 times the usual step (the median over such edges)
+        does not belong to it. A single pose is its own end.
+        """
+        if self.num_poses == 1:
+            return 0
+        low, high = np.sort(self.edges, axis=1).T
+        joined = np.zeros(self.num_poses - 1, dtype=np.bool_)  # pose k to pose k + 1
+        joined[low[high - low == 1]] = True
+        if not joined.any():
+            return None
+        jumps = np.abs(np.diff(self.ids))
+        joined &= jumps <= _LARGEST_ID_JUMP * np.median(jumps[joined])
+        begin = int(np.argmax(joined))
+        breaks = np.flatnonzero(~joined[begin:])
+        return begin + int(breaks[0]) if breaks.size else self.num_poses - 1
 
     @cached_property
     def chi2(self) -> float:
@@ -195,6 +215,4 @@ def checked_pose_rows(
         zero = np.flatnonzero(np.linalg.norm(array[:, 3:], axis=1) < 1e-6)
         if zero.size:
             raise InvalidGraphError(f"expected unit quaternions in {name}, got a zero one in row {zero[0]}")
-    normalized = group.normalized(array)
-    normalized.flags.writeable = False
-    return normalized, group
+    return read_only(group.normalized(array)), group

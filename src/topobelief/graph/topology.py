@@ -14,12 +14,12 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from topobelief.arrays import FloatArray, IntArray, frozen_floats, frozen_ints
+from topobelief.arrays import FloatArray, IntArray, ReadOnlyArrays, frozen_floats, frozen_ints, read_only
 from topobelief.errors import DisconnectedGraphError, InvalidGraphError
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class Topology:
+class Topology(ReadOnlyArrays):
     """Nodes 0 … num_nodes - 1 and undirected edges between them.
 
     Parameters
@@ -75,7 +75,7 @@ class Topology:
     @cached_property
     def degrees(self) -> IntArray:
         """d(i), parallel edges counted; shape (num_nodes,)."""
-        return np.bincount(self.edges.ravel(), minlength=self.num_nodes).astype(np.int64)
+        return read_only(np.bincount(self.edges.ravel(), minlength=self.num_nodes).astype(np.int64))
 
     def weighted_degrees(self, weights: FloatArray) -> FloatArray:
         """Diagonal of the weighted Laplacian, shape (num_nodes,)."""
@@ -86,6 +86,14 @@ class Topology:
         """The same graph with parallel edges collapsed into one; edges sorted."""
         keys = np.unique(np.sort(self.edges, axis=1), axis=0)
         return Topology(self.num_nodes, keys)
+
+    @cached_property
+    def degree_sum(self) -> float:
+        """Sum over the edges of the simple graph of 1 / (d(i) d(j)), d its degrees."""
+        simple = self.simple()
+        i, j = simple.edges.T
+        degrees = simple.degrees.astype(np.float64)
+        return float(np.sum(1 / (degrees[i] * degrees[j])))
 
     def laplacian(self, weights: ArrayLike | None = None) -> sparse.csr_array:
         """L = D - W, shape (num_nodes, num_nodes), sparse.
@@ -110,7 +118,7 @@ class Topology:
         """Connected component of each node, shape (num_nodes,)."""
         i, j = self.edges.T
         adjacency = sparse.coo_array((np.ones(self.num_edges), (i, j)), shape=(self.num_nodes, self.num_nodes))
-        return np.asarray(connected_components(adjacency, directed=False)[1], dtype=np.int64)
+        return read_only(np.asarray(connected_components(adjacency, directed=False)[1], dtype=np.int64))
 
     @property
     def num_components(self) -> int:

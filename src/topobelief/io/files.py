@@ -18,13 +18,15 @@ from topobelief.errors import FileError
 StrPath = str | os.PathLike[str]
 
 
-def read_text(path: StrPath) -> str:
+def read_text(path: StrPath, *, any_encoding: bool = False) -> str:
     """The content of a text file.
 
     Parameters
     ----------
     path
         A file in UTF-8, of which ASCII is a part. A byte order mark is dropped and line ends become "\\n".
+    any_encoding
+        Whether bytes that are not UTF-8 become "\ufffd", as in a format that is ASCII but for its comments.
 
     Raises
     ------
@@ -40,7 +42,7 @@ def read_text(path: StrPath) -> str:
     if b"\0" in content:
         raise FileError(path, f"expected a text file, got a binary one (NUL at byte {content.index(0)})")
     try:
-        text = content.decode("utf-8-sig")
+        text = content.decode("utf-8-sig", errors="replace" if any_encoding else "strict")
     except UnicodeDecodeError as error:
         raise FileError(path, f"expected a text file, got a binary one (not UTF-8 at byte {error.start})") from None
     return text.replace("\r\n", "\n").replace("\r", "\n")

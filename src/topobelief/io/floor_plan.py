@@ -41,7 +41,10 @@ def read_world(path: StrPath, *, unknown: Unknown = "occupied") -> World:
         return read_ros_map(path, unknown=unknown)
     if suffix == ".csv":
         return read_walls(path)
-    raise FileError(path, f"expected a map that ends in .yaml, .yml (ROS map) or .csv (walls), got {suffix or 'no suffix'}")
+    hint = "; name the YAML file that belongs to the image" if suffix in (".pgm", ".png", ".bmp", ".jpg", ".tif") else ""
+    raise FileError(
+        path, f"expected a map that ends in .yaml, .yml (ROS map) or .csv (walls), got {suffix or 'no suffix'}{hint}"
+    )
 
 
 def read_walls(path: StrPath, *, bounds: Sequence[float] | None = None) -> World:
@@ -59,12 +62,14 @@ def read_walls(path: StrPath, *, bounds: Sequence[float] | None = None) -> World
         Names the file and the line.
     """
     boxes: list[list[float]] = []
+    bounds_in_file: list[float] | None = None
     has_header = False
     for number, line in enumerate(read_text(path).splitlines(), start=1):
         text = line.strip()
         if match := _BOUNDS.fullmatch(text):
-            in_file = _extent(path, number, match[1].replace(",", " ").split(), "bounds")
-            bounds = in_file if bounds is None else bounds
+            if bounds_in_file is not None:
+                raise FileError(path, "expected bounds once, got a second line of them; remove one", line=number)
+            bounds_in_file = _extent(path, number, match[1].replace(",", " ").split(), "bounds")
         elif not text or text.startswith("#"):
             continue
         elif not has_header:
@@ -76,7 +81,7 @@ def read_walls(path: StrPath, *, bounds: Sequence[float] | None = None) -> World
     if not has_header:
         raise FileError(path, f"expected the header {','.join(_HEADER)}, got no line but comments")
     try:
-        return World.from_boxes(boxes, bounds)
+        return World.from_boxes(boxes, bounds_in_file if bounds is None else bounds)
     except InvalidMapError as error:
         raise FileError(path, str(error)) from None
 

@@ -1,31 +1,38 @@
-"""Pose graphs in whatever format the name of the file says."""
+"""Pose graphs in whatever format the content of the file shows."""
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import Unpack
 
-from topobelief.errors import FileError
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.files import StrPath
-from topobelief.io.g2o import read_g2o
-from topobelief.io.toro import read_toro
+from topobelief.io.g2o import G2O
+from topobelief.io.graph_lines import read_lines
+from topobelief.io.reading import ReadGraph, ReadingKeywords, ReadingOptions
+from topobelief.io.toro import TORO
 
-_READERS = {".g2o": read_g2o, ".toro": read_toro, ".graph": read_toro}
 
+def read_pose_graph(path: StrPath, **options: Unpack[ReadingKeywords]) -> PoseGraph:
+    """Read a pose graph in g2o or TORO format; the first line of a graph tells which, the name of the file does not matter.
 
-def read_pose_graph(path: StrPath) -> PoseGraph:
-    """Read a pose graph: .g2o as g2o, .toro and .graph as TORO; upper or lower case.
+    Parameters
+    ----------
+    path
+        The file. Metres and radians.
+    **options
+        What to drop or assume instead of refusing the file: see `topobelief.ReadingOptions`. What an option changed is
+        issued as a `ReadingWarning`.
 
     Raises
     ------
     FileError
-        If the suffix is another one, or the file is wrong.
+        If the file is wrong, or holds more than poses and plain edges and no option says what to do about that.
     DisconnectedGraphError
         If poses that the file does not give cannot be composed from its edges.
     """
-    suffix = Path(path).suffix.lower()
-    if suffix not in _READERS:
-        raise FileError(
-            path, f"expected a name that ends in {', '.join(_READERS)}, got {suffix or 'no suffix'!r}; rename the file"
-        )
-    return _READERS[suffix](path)
+    return read_graph_file(path, ReadingOptions(**options)).warned()
+
+
+def read_graph_file(path: StrPath, options: ReadingOptions) -> ReadGraph:
+    """As `read_pose_graph`, with what was dropped or assumed as notes in place of warnings."""
+    return read_lines(path, (G2O, TORO), options)

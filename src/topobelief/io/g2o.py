@@ -13,47 +13,54 @@ of the quaternion, half the angle, so a file that states information per radian 
 
 from __future__ import annotations
 
+import re
+from typing import Unpack
+
 from topobelief.errors import InvalidInputError
 from topobelief.geometry import SE2_GROUP, SE3_GROUP
 from topobelief.graph.pose_graph import PoseGraph
+from topobelief.io.dialect import Dialect, Tag, upper_triangle
 from topobelief.io.files import StrPath, write_text
-from topobelief.io.graph_lines import ID_LIMIT, Dialect, Tag, read_lines, upper_triangle
+from topobelief.io.graph_lines import read_lines
+from topobelief.io.reading import ReadingKeywords, ReadingOptions
 
-_LANDMARKS = "landmarks are not supported yet; remove the lines of landmarks and of their edges"
-_SENSORS = "sensor parameters are not supported; remove the line if the edges are between poses"
-_G2O = Dialect(
+_OFFSET = "it measures between sensors that sit off the poses; convert it to an edge between the poses"
+G2O = Dialect(
+    name="g2o",
     tags={
         "VERTEX_SE2": Tag("vertex", SE2_GROUP),
         "EDGE_SE2": Tag("edge", SE2_GROUP),
         "VERTEX_SE3:QUAT": Tag("vertex", SE3_GROUP),
         "EDGE_SE3:QUAT": Tag("edge", SE3_GROUP),
     },
-    information_entries={group.tangent_dim: upper_triangle(group.tangent_dim) for group in (SE2_GROUP, SE3_GROUP)},
+    marks=re.compile(r"(VERTEX|EDGE|PARAMS)_.*"),
+    orders={"g2o": {group.tangent_dim: upper_triangle(group.tangent_dim) for group in (SE2_GROUP, SE3_GROUP)}},
     refused={
-        "VERTEX_XY": _LANDMARKS,
-        "VERTEX_TRACKXYZ": _LANDMARKS,
-        "VERTEX_POINT": _LANDMARKS,
-        "EDGE_SE2_": _LANDMARKS,
-        "EDGE_SE3_": _LANDMARKS,
-        "EDGE_BEARING_": _LANDMARKS,
-        "EDGE_RANGE_": _LANDMARKS,
-        "PARAMS_": _SENSORS,
+        "EDGE_SE2_OFFSET": _OFFSET,
+        "EDGE_SE3_OFFSET": _OFFSET,
+        **dict.fromkeys(
+            ("VERTEX2", "EDGE2", "VERTEX3", "EDGE3"),
+            "it belongs to the format TORO, and a file is in one format; read a TORO file with read_toro or read_pose_graph",
+        ),
     },
 )
 
 
-def read_g2o(path: StrPath) -> PoseGraph:
+def read_g2o(path: StrPath, **options: Unpack[ReadingKeywords]) -> PoseGraph:
     """Read a pose graph from a g2o file.
 
     Ids may be in any order and leave gaps: poses are sorted by id and `PoseGraph.ids` keeps the ids; edges keep the order
     of the file. `#` starts a comment. A pose without a VERTEX line is composed from edges along a spanning tree that prefers
     odometry, outwards from the poses that have one; where no pose has one, from the lowest id at the origin. FIX lines are
-    kept as `PoseGraph.fixed`.
+    kept as `PoseGraph.fixed`. PARAMS lines, the offsets of sensors, are skipped.
 
     Parameters
     ----------
     path
-        The file. Metres and radians.
+        The file. Metres and radians. Bytes that are no text matter only outside of comments.
+    **options
+        What to drop or assume instead of refusing the file: see `topobelief.ReadingOptions`. What an option changed is
+        issued as a `ReadingWarning`.
 
     Returns
     -------
@@ -63,13 +70,13 @@ def read_g2o(path: StrPath) -> PoseGraph:
     Raises
     ------
     FileError
-        If the file cannot be read or a line is wrong: names the line, what was expected and what is there. Where the file has
-        VERTEX lines, an id without one that a single edge names is refused (an edge to nowhere) unless that edge
-        links consecutive ids.
+        If the file cannot be read, a line is wrong, or it holds more than poses and plain edges and no option says what to do
+        about that: names the line, what was expected and what is there. Where the file has VERTEX lines, an id without one
+        that a single edge names is refused (an edge to nowhere) unless that edge links consecutive ids.
     DisconnectedGraphError
         If poses without a VERTEX line are connected to none that has one; names some of them.
     """
-    return read_lines(path, _G2O)
+    return read_lines(path, (G2O,), ReadingOptions(**options)).warned()
 
 
 def write_g2o(graph: PoseGraph, path: StrPath) -> None:
@@ -82,14 +89,11 @@ def write_g2o(graph: PoseGraph, path: StrPath) -> None:
     FileError
         If the file cannot be written.
     InvalidInputError
-        If an id is negative or so large that `read_g2o` would refuse it.
+        If an id is negative, which `read_g2o` would refuse.
     """
-    if graph.ids.min() < 0 or graph.ids.max() >= ID_LIMIT:
-        raise InvalidInputError(
-            "expected ids from 0 to 2^53 - 1 for a file, "
-            f"got ids from {graph.ids.min()} to {graph.ids.max()}; renumber the poses"
-        )
-    vertex, edge = (tag for tag, meaning in _G2O.tags.items() if meaning.group is graph.group)
+    if graph.ids.min() < 0:
+        raise InvalidInputError(f"expected ids from 0 to 2^63 - 1 for a file, got {graph.ids.min()}; renumber the poses")
+    vertex, edge = (tag for tag, meaning in G2O.tags.items() if meaning.group is graph.group)
     rows, columns = upper_triangle(graph.tangent_dim)
     lines = [f"{vertex} {name} {_joined(pose)}" for name, pose in zip(graph.ids.tolist(), graph.poses.tolist(), strict=True)]
     lines += [f"FIX {graph.ids[index]}" for index in graph.fixed]

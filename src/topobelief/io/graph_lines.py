@@ -6,89 +6,49 @@ what the numbers mean is checked on whole columns, and an error looks up the lin
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal
 
 import numpy as np
 
 from topobelief.arrays import BoolArray, FloatArray, IntArray
 from topobelief.errors import DisconnectedGraphError, FileError, InvalidGraphError
-from topobelief.geometry import Group
+from topobelief.geometry import SE3_GROUP, Group
 from topobelief.graph.dead_reckoning import dead_reckoned_poses
-from topobelief.graph.information import checked_information
+from topobelief.graph.information import positive_definite
 from topobelief.graph.pose_graph import PoseGraph
+from topobelief.graph.projection import projected_to_plane
+from topobelief.graph.topology import Topology
+from topobelief.io.dialect import Dialect, Tag
 from topobelief.io.files import StrPath, read_text
+from topobelief.io.foreign_lines import ForeignLines
+from topobelief.io.reading import ReadGraph, ReadingOptions, by_option
+from topobelief.io.robust_edges import SWITCHES, plain_edges
+from topobelief.symbols import find_node, node_name
 
-ID_LIMIT = 2**53  # below it every whole number is a double
+_ID_LIMIT = 2**63  # ids are kept as signed 64-bit integers
 _QUATERNION_NORMS = (1e-6, 1e6)  # what rounding and carelessness leave of a unit quaternion
-
-
-@dataclass(frozen=True)
-class Tag:
-    """What a line with this tag holds: ids, the numbers of a pose, and an edge's information."""
-
-    kind: Literal["vertex", "edge"]
-    group: Group
-
-    @property
-    def num_ids(self) -> int:
-        """1 for a vertex, 2 for an edge."""
-        return 1 if self.kind == "vertex" else 2
-
-    @property
-    def num_information(self) -> int:
-        """Entries of the upper triangle for an edge, 0 for a vertex."""
-        return self.group.tangent_dim * (self.group.tangent_dim + 1) // 2 if self.kind == "edge" else 0
-
-    @property
-    def num_fields(self) -> int:
-        """Fields after the tag."""
-        return self.num_ids + self.group.pose_size + self.num_information
-
-
-@dataclass(frozen=True)
-class Dialect:
-    """A format of pose-graph files.
-
-    Parameters
-    ----------
-    tags
-        The lines that are read; "FIX" is part of every dialect.
-    information_entries
-        (row, column) of each number of an edge's information, in the order of the file, for each tangent dimension.
-    refused
-        Starts of tags that the format knows and this reader does not, and why.
-    """
-
-    tags: Mapping[str, Tag]
-    information_entries: Mapping[int, tuple[IntArray, IntArray]]
-    refused: Mapping[str, str]
 
 
 @dataclass
 class _Table:
-    """Lines with one tag: their numbers in the file and all their fields as numbers, end to end."""
+    """Lines with one tag: their numbers in the file, their ids and their other numbers, end to end."""
 
     tag: str
     meaning: Tag
     lines: list[int] = field(default_factory=list[int])
+    ids: list[int] = field(default_factory=list[int])
     numbers: list[float] = field(default_factory=list[float])
 
-    def columns(self) -> tuple[FloatArray, FloatArray]:
+    def columns(self) -> tuple[IntArray, FloatArray]:
         """Ids, shape (count, 1 or 2), and values, shape (count, pose numbers and information entries)."""
-        rows = np.array(self.numbers).reshape(-1, self.meaning.num_fields)
-        return rows[:, : self.meaning.num_ids], rows[:, self.meaning.num_ids :]
+        num_ids = self.meaning.num_ids
+        ids = np.array(self.ids, dtype=np.int64).reshape(-1, num_ids)
+        return ids, np.array(self.numbers).reshape(-1, self.meaning.num_fields - num_ids)
 
 
-def upper_triangle(size: int) -> tuple[IntArray, IntArray]:
-    """(row, column) of the entries of an upper triangle, row by row."""
-    rows, columns = np.triu_indices(size)
-    return rows.astype(np.int64), columns.astype(np.int64)
-
-
-def read_lines(path: StrPath, dialect: Dialect) -> PoseGraph:
-    """Read a pose graph.
+def read_lines(path: StrPath, dialects: Sequence[Dialect], options: ReadingOptions) -> ReadGraph:
+    """Read a pose graph in that one of some formats to which the first line of a graph belongs.
 
     Raises
     ------
@@ -97,49 +57,77 @@ def read_lines(path: StrPath, dialect: Dialect) -> PoseGraph:
     DisconnectedGraphError
         If poses without a vertex line hang on none that has one; names some of them.
     """
-    return _Reader(path, dialect).graph()
+    return _Reader(path, dialects, options).read()
 
 
 class _Reader:
     """One file on its way to a pose graph."""
 
-    def __init__(self, path: StrPath, dialect: Dialect) -> None:
+    def __init__(self, path: StrPath, dialects: Sequence[Dialect], options: ReadingOptions) -> None:
         self.path = path
-        self.dialect = dialect
-        self.text_lines = read_text(path).split("\n")
-        self.fix_lines: list[tuple[int, list[float]]] = []
+        self.options = options
+        self.text_lines = read_text(path, any_encoding=True).split("\n")
+        self.rewritten: dict[int, list[str]] = {}  # fields of robust edges as plain ones, by index of the line
+        self.dialect, self.expected = self._dialect(dialects)
+        self.notes: list[str] = []
+        if options.robust_as_plain:
+            fields = [self._fields(number) for number in range(1, len(self.text_lines) + 1)]
+            self.rewritten, self.notes = plain_edges(path, fields, self.dialect.tags)
+        self.foreign = ForeignLines()
+        self.fix_lines: list[tuple[int, list[int]]] = []
         tables = self._tables()
+        self.fix_lines = [(number, self.foreign.take_fixed(number, ids)) for number, ids in self.fix_lines]
+        self.foreign.refuse(path, options.drop)
+        self.notes += self.foreign.notes()
         self.group = self._common_group(tables)
         self.vertices = next(table for table in tables if table.meaning == Tag("vertex", self.group))
         self.edges = next(table for table in tables if table.meaning == Tag("edge", self.group))
 
-    def graph(self) -> PoseGraph:
-        """The pose graph, all of it checked."""
+    def read(self) -> ReadGraph:
+        """The pose graph, all of it checked, and what was dropped or assumed."""
+        size = self.group.pose_size
         vertex_ids, vertex_values = self._checked_columns(self.vertices)
         edge_ids, edge_values = self._checked_columns(self.edges)
         self._refuse_repeated_ids(vertex_ids[:, 0])
         self._refuse_self_loops(edge_ids)
-        ids = np.unique(np.concatenate([vertex_ids.ravel(), edge_ids.ravel()]))
-        if len(edge_ids) == 0 and len(ids) > 1:
-            raise FileError(self.path, f"expected {self.edges.tag} lines between the {len(ids)} poses, got none")
-        if 0 < len(vertex_ids) < len(ids):
+        named = np.unique(np.concatenate([vertex_ids.ravel(), edge_ids.ravel()]))
+        if len(edge_ids) == 0 and len(named) > 1:
+            raise FileError(self.path, f"expected {self.edges.tag} lines between the {len(named)} poses, got none")
+        self._refuse_edges_to_other_things(edge_ids)
+        if 0 < len(vertex_ids) < len(named):
             self._refuse_edges_to_nowhere(vertex_ids, edge_ids)
 
-        kappa, size = self.group.tangent_dim, self.group.pose_size
-        rows, columns = self.dialect.information_entries[kappa]
-        information = np.empty((len(edge_ids), kappa, kappa))
-        information[:, rows, columns] = information[:, columns, rows] = edge_values[:, size:]
-        edges, known = np.searchsorted(ids, edge_ids), np.searchsorted(ids, vertex_ids[:, 0])
-        measurements = self.group.normalized(edge_values[:, :size])
-        poses = self._placed(ids, edges, measurements, known, self.group.normalized(vertex_values))
-        fixed = self._fixed(ids)
+        information, definite = self._definite(edge_values[:, size:])
+        ids = np.unique(np.concatenate([vertex_ids.ravel(), edge_ids[definite].ravel()]))
+        ids = ids[self._in_component(ids, edge_ids[definite])]
+        kept, given = definite & np.isin(edge_ids[:, 0], ids), np.isin(vertex_ids[:, 0], ids)
+        edges, known = np.searchsorted(ids, edge_ids[kept]), np.searchsorted(ids, vertex_ids[given, 0])
+        measurements = self.group.normalized(edge_values[kept, :size])
+        poses = self._placed(ids, edges, measurements, known, self.group.normalized(vertex_values[given]))
+        fixed = self._fixed(named, ids)
         try:
-            return PoseGraph(poses, edges, measurements, information, ids=ids, fixed=fixed)
+            graph = PoseGraph(poses, edges, measurements, information[kept], ids=ids, fixed=fixed)
+            if self.options.planar and graph.tangent_dim == SE3_GROUP.tangent_dim:
+                graph, note = projected_to_plane(graph)
+                self.notes.append(note)
         except InvalidGraphError as error:
-            raise self._information_error(information) or FileError(self.path, str(error)) from None
+            raise FileError(self.path, str(error)) from None
+        return ReadGraph(graph, tuple(self.notes))
+
+    def _dialect(self, dialects: Sequence[Dialect]) -> tuple[Dialect, str]:
+        """The format of the first line that shows one, and the tags that are expected."""
+        for number in range(1, len(self.text_lines) + 1):
+            tag = next(iter(self._fields(number)), "")
+            for dialect in dialects:
+                if dialect.marks.fullmatch(tag):
+                    return dialect, ", ".join(dialect.tags)
+        return dialects[0], ", ".join(tag for dialect in dialects for tag in dialect.tags)
 
     def _tables(self) -> list[_Table]:
-        """Fields by tag; blank lines and comments dropped."""
+        """Fields by tag; blank lines, comments, sensor parameters, and what is foreign dropped.
+
+        Parameters of sensors matter to none of the lines that are read.
+        """
         tables = {tag: _Table(tag, meaning) for tag, meaning in self.dialect.tags.items()}
         for number, line in enumerate(self.text_lines, start=1):
             fields = self._fields(number)
@@ -148,40 +136,53 @@ class _Reader:
             tag = fields.pop(0)
             table = tables.get(tag)
             if table is None and tag != "FIX":
-                raise FileError(self.path, self._refusal(tag), line=number)
+                skipped = tag.startswith("PARAMS_") or (self.rewritten and tag in SWITCHES)
+                if not skipped and not self.foreign.take(tag, number, fields):
+                    raise FileError(self.path, self._refusal(tag), line=number)
+                continue
             if table is not None and len(fields) != table.meaning.num_fields:
                 raise FileError(self.path, _wrong_count(table, len(fields)), line=number)
+            num_ids = table.meaning.num_ids if table is not None else len(fields)
             try:
-                numbers = [float(text) for text in fields]
+                numbers = [float(text) for text in fields[num_ids:]]
+                ids = _whole_numbers(fields[:num_ids])
                 plain = line.isascii() and line.count("_") == tag.count("_")  # float takes other digits, and 1_000
             except ValueError:
-                numbers, plain = [], False
+                ids, numbers, plain = [], [], False
             if not plain and (wrong := next((text for text in fields if not _is_number(text)), None)) is not None:
                 raise FileError(self.path, f"expected a number for {tag}, got {wrong[:40]!r}", line=number)
-            if table is None:
-                self.fix_lines.append((number, numbers))
-            else:
+            if ids and (min(ids) < 0 or max(ids) >= _ID_LIMIT):
+                wrong = next(text for text, value in zip(fields, ids, strict=False) if not 0 <= value < _ID_LIMIT)
+                message = f"expected whole ids from 0 to 2^63 - 1 for {tag}, got {wrong[:40]}; renumber the poses"
+                raise FileError(self.path, message, line=number)
+            if table is not None:
                 table.lines.append(number)
+                table.ids.extend(ids)
                 table.numbers.extend(numbers)
+            elif ids:
+                self.fix_lines.append((number, ids))
+            else:
+                raise FileError(self.path, "expected at least one id for FIX, got none", line=number)
         return list(tables.values())
 
     def _fields(self, number: int) -> list[str]:
         line = self.text_lines[number - 1]
+        if number - 1 in self.rewritten:
+            return list(self.rewritten[number - 1])
         return (line.partition("#")[0] if "#" in line else line).split()
 
     def _refusal(self, tag: str) -> str:
-        shown = tag if tag.isprintable() and len(tag) <= 40 else f"{tag[:40]!a}"
-        reason = next((why for start, why in self.dialect.refused.items() if tag.startswith(start)), None)
-        expected = f"expected {', '.join(self.dialect.tags)} or FIX"
+        shown = tag if tag.isascii() and tag.isprintable() and len(tag) <= 40 else f"{tag[:40]!a}"
+        reason = self.dialect.refused.get(tag)
         if reason is None:
-            return f"{expected}, got the unknown tag {shown}; remove the line if it does not matter"
-        return f"{expected}, got {shown}: {reason}"
+            return f"expected {self.expected} or FIX, got the unknown tag {shown}; remove the line if it does not matter"
+        return f"expected {self.expected} or FIX, got {shown}: {reason}"
 
     def _common_group(self, tables: list[_Table]) -> Group:
         """The one group of all lines."""
         found = sorted((table for table in tables if table.lines), key=lambda table: table.lines[0])
         if not found:
-            raise FileError(self.path, f"expected lines with {', '.join(self.dialect.tags)}, got none")
+            raise FileError(self.path, f"expected lines with {self.expected}, got none")
         first = found[0]
         for table in found:
             if table.meaning.group is not first.meaning.group:
@@ -192,26 +193,21 @@ class _Reader:
         return first.meaning.group
 
     def _checked_columns(self, table: _Table) -> tuple[IntArray, FloatArray]:
-        """Ids as integers and finite values, quaternions of a length that can be normalised."""
-        raw_ids, values = table.columns()
-        self._refuse(table, ~_is_id(raw_ids), "expected whole ids from 0 to 2^53 - 1", advice="; renumber the poses")
-        self._refuse(table, ~np.isfinite(values), "expected finite numbers", offset=table.meaning.num_ids)
+        """Ids, and finite values with quaternions of a length that can be normalised."""
+        ids, values = table.columns()
+        wrong = np.argwhere(~np.isfinite(values))
+        if wrong.size:
+            row, column = (int(index) for index in wrong[0])
+            text = self._fields(table.lines[row])[1 + table.meaning.num_ids + column]
+            raise FileError(self.path, f"expected finite numbers for {table.tag}, got {text[:40]}", line=table.lines[row])
         if self.group.rotation_dim > 1:
             with np.errstate(over="ignore"):
                 norms = np.linalg.norm(values[:, self.group.position_dim : self.group.pose_size], axis=1)
-            wrong = np.flatnonzero(~((norms >= _QUATERNION_NORMS[0]) & (norms <= _QUATERNION_NORMS[1])))
-            if wrong.size:
-                message = f"expected a unit quaternion for {table.tag}, got one of norm {norms[wrong[0]]:.3g}"
-                raise FileError(self.path, message, line=table.lines[int(wrong[0])])
-        return raw_ids.astype(np.int64), values
-
-    def _refuse(self, table: _Table, wrong: BoolArray, expected: str, *, offset: int = 0, advice: str = "") -> None:
-        """Name the line and field of the first wrong entry, if there is one."""
-        if wrong.any():
-            row, column = np.unravel_index(int(np.argmax(wrong)), wrong.shape)
-            line = table.lines[int(row)]
-            text = self._fields(line)[1 + offset + int(column)]
-            raise FileError(self.path, f"{expected} for {table.tag}, got {text}{advice}", line=line)
+            zero = np.flatnonzero(~((norms >= _QUATERNION_NORMS[0]) & (norms <= _QUATERNION_NORMS[1])))
+            if zero.size:
+                message = f"expected a unit quaternion for {table.tag}, got one of norm {norms[zero[0]]:.3g}"
+                raise FileError(self.path, message, line=table.lines[int(zero[0])])
+        return ids, values
 
     def _refuse_repeated_ids(self, ids: IntArray) -> None:
         first_rows, row_groups = np.unique(ids, return_index=True, return_inverse=True)[1:]
@@ -219,14 +215,23 @@ class _Reader:
         if repeated.size:
             again, lines = int(repeated[0]), self.vertices.lines
             first = lines[int(first_rows[row_groups[again]])]
-            message = f"expected one {self.vertices.tag} per id, got id {ids[again]} again (first on line {first})"
+            name = node_name(int(ids[again]))
+            message = f"expected one {self.vertices.tag} per id, got id {name} again (first on line {first})"
             raise FileError(self.path, message, line=lines[again])
 
     def _refuse_self_loops(self, ids: IntArray) -> None:
         loops = np.flatnonzero(ids[:, 0] == ids[:, 1])
         if loops.size:
-            message = f"expected an edge between two poses, got a self-loop at {ids[loops[0], 0]}"
+            message = f"expected an edge between two poses, got a self-loop at {node_name(int(ids[loops[0], 0]))}"
             raise FileError(self.path, message, line=self.edges.lines[int(loops[0])])
+
+    def _refuse_edges_to_other_things(self, ids: IntArray) -> None:
+        """An edge between poses cannot lead to a vertex that was dropped because it is no pose."""
+        others = np.argwhere(np.isin(ids, list(self.foreign.vertices)))
+        if others.size:
+            row, end = (int(index) for index in others[0])
+            message = f"expected an edge between poses, got one to {node_name(int(ids[row, end]))}, which is no pose"
+            raise FileError(self.path, message, line=self.edges.lines[row])
 
     def _refuse_edges_to_nowhere(self, vertex_ids: IntArray, edge_ids: IntArray) -> None:
         """Beside vertex lines, an id without one that a single edge names, and no odometry, is more likely a slip."""
@@ -237,10 +242,64 @@ class _Reader:
         if nowhere.size:
             row, end = (int(index) for index in nowhere[0])
             message = (
-                f"expected an edge between poses, got one to nowhere: {edge_ids[row, end]} has no {self.vertices.tag} line "
-                "and no other edge; correct the id or add its line"
+                f"expected an edge between poses, got one to nowhere: {node_name(int(edge_ids[row, end]))} has no "
+                f"{self.vertices.tag} line and no other edge; correct the id or add its line"
             )
             raise FileError(self.path, message, line=self.edges.lines[row])
+
+    def _information(self, entries: FloatArray, order: str) -> FloatArray:
+        """Information matrices whose entries stand in the named order."""
+        kappa = self.group.tangent_dim
+        rows, columns = self.dialect.orders[order][kappa]
+        information = np.empty((len(entries), kappa, kappa))
+        information[:, rows, columns] = information[:, columns, rows] = entries
+        return information
+
+    def _definite(self, entries: FloatArray) -> tuple[FloatArray, BoolArray]:
+        """Information matrices, and which of them are positive definite; others are refused unless they may be dropped."""
+        orders = list(self.dialect.orders)
+        order = self.options.edge2_order if self.options.edge2_order in orders else orders[0]
+        information = self._information(entries, order)
+        definite = positive_definite(information)
+        wrong = np.flatnonzero(~definite)
+        if wrong.size == 0:
+            return information, definite
+        spectrum = np.linalg.eigvalsh(information[wrong[0]])
+        line = self.edges.lines[int(wrong[0])]
+        message = (
+            f"expected a positive definite information matrix for {self.edges.tag}, "
+            f"got eigenvalues from {spectrum[0]:.3g} to {spectrum[-1]:.3g}"
+        )
+        for other in orders:
+            if positive_definite(self._information(entries, other)).all():
+                advice = f'--edge2-order {other} (in Python edge2_order="{other}")'
+                message += f"; in the other order of {self.edges.tag} all edges have one: read the file with {advice}"
+                raise FileError(self.path, message, line=line)
+        many = f"{wrong.size} of {len(definite)} edges, whose information is not positive definite"
+        if "indefinite" not in self.options.drop:
+            raise FileError(self.path, f"{message}; leave out {many}, with {by_option('indefinite')}", line=line)
+        self.notes.append(f"dropped {many} (the first on line {line})")
+        return information, definite
+
+    def _in_component(self, ids: IntArray, edge_ids: IntArray) -> BoolArray:
+        """Which poses are in the part of the graph that is asked for."""
+        wanted = self.options.component
+        topology = Topology(len(ids), np.searchsorted(ids, edge_ids))
+        labels = topology.component_labels
+        if wanted == "all":
+            return np.ones(len(ids), dtype=np.bool_)
+        if wanted == "largest":
+            member = int(np.argmax(np.bincount(labels)[labels]))
+        elif (found := find_node(ids.tolist(), wanted)) is not None:
+            member = found
+        else:
+            raise FileError(self.path, f'expected component to be "all", "largest" or the id of a pose, got {wanted!r}')
+        inside = labels == labels[member]
+        if not inside.all():
+            first, last = (node_name(int(ids[index])) for index in np.flatnonzero(inside)[[0, -1]])
+            kept = f"{np.count_nonzero(inside)} of {len(ids)} poses ({first} … {last})"
+            self.notes.append(f"kept one of {topology.num_components} components: {kept}")
+        return inside
 
     def _placed(
         self, ids: IntArray, edges: IntArray, measurements: FloatArray, known: IntArray, known_poses: FloatArray
@@ -254,32 +313,17 @@ class _Reader:
             raise DisconnectedGraphError(ids[unreached].tolist(), anchor=int(ids[known.min()]), what=f"graph in {self.path}")
         return poses
 
-    def _fixed(self, ids: IntArray) -> tuple[int, ...]:
-        """Indices of the poses that FIX lines name, in increasing order."""
+    def _fixed(self, named: IntArray, ids: IntArray) -> tuple[int, ...]:
+        """Indices of the poses that FIX lines name, in increasing order, without those that were dropped."""
         fixed: set[int] = set()
         for number, wanted in self.fix_lines:
-            if not wanted:
-                raise FileError(self.path, "expected at least one id for FIX, got none", line=number)
             for value in wanted:
-                if value not in ids:
-                    message = f"expected the id of a pose for FIX, got {value:.17g}, which no other line names"
+                if value not in named:
+                    message = f"expected the id of a pose for FIX, got {node_name(value)}, which no other line names"
                     raise FileError(self.path, message, line=number)
-                fixed.add(int(np.searchsorted(ids, int(value))))
+                if value in ids:
+                    fixed.add(int(np.searchsorted(ids, value)))
         return tuple(sorted(fixed))
-
-    def _information_error(self, information: FloatArray) -> FileError | None:
-        """The first edge whose information is refused."""
-        for line, matrix in zip(self.edges.lines, information, strict=True):
-            try:
-                checked_information(matrix, num_edges=1, tangent_dim=len(matrix))
-            except InvalidGraphError:
-                spectrum = np.linalg.eigvalsh(matrix)
-                message = (
-                    f"expected a positive definite information matrix for {self.edges.tag}, "
-                    f"got eigenvalues from {spectrum[0]:.3g} to {spectrum[-1]:.3g}"
-                )
-                return FileError(self.path, message, line=line)
-        return None
 
 
 def _wrong_count(table: _Table, got: int) -> str:
@@ -292,8 +336,21 @@ def _wrong_count(table: _Table, got: int) -> str:
     return f"expected {ids}, {meaning.group.pose_size} numbers{more} for {table.tag}, got {got} fields"
 
 
-def _is_id(values: FloatArray) -> BoolArray:
-    return (values >= 0) & (values < ID_LIMIT) & (values == np.floor(values))
+def _whole_numbers(texts: list[str]) -> list[int]:
+    """The whole numbers that texts are; -1 in place of other numbers."""
+    try:
+        return [int(text) for text in texts]
+    except ValueError:
+        return [_whole_number(text) for text in texts]
+
+
+def _whole_number(text: str) -> int:
+    """As `_whole_numbers`, for one that may be written as 1e3 or 5.0."""
+    try:
+        return int(text)
+    except ValueError:
+        number = float(text)
+        return int(number) if number.is_integer() else -1
 
 
 def _is_number(text: str) -> bool:

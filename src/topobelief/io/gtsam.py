@@ -63,20 +63,23 @@ def from_gtsam(factors: Any, values: Any) -> PoseGraph:
     ----------
     factors : gtsam.NonlinearFactorGraph
         BetweenFactorPose2 or BetweenFactorPose3 with Gaussian noise. One prior on one pose is allowed and left out: it only
-        says where the graph lies, on which no quantity depends.
+        says where the graph lies, on which no quantity depends. Slots of removed factors are skipped.
     values : gtsam.Values
-        A pose for every key of the factors.
+        A pose for every key of the factors; keys are below 2^63.
 
     Raises
     ------
     InvalidInputError
-        If a factor is of another kind, has robust or constrained noise, or is a second prior; or if a pose is missing.
-        Names the factor or the key.
+        If the arguments are of other types or swapped; if a factor is of another kind, has robust or constrained noise, or is a
+        second prior; if a pose is missing, or a key too large for an id. Names the factor or the key.
     InvalidGraphError
         If the graph itself is malformed, for example a self-loop.
     """
     gtsam = load_gtsam()
+    _require_factors_and_values(gtsam, factors, values)
     keys: list[int] = sorted(values.keys())
+    if keys and keys[-1] >= 2**63:
+        raise InvalidInputError(f"expected keys below 2^63, got {keys[-1]}; use a symbol with an ASCII character")
     index_of = {key: index for index, key in enumerate(keys)}
     poses = [_value(gtsam, values, key) for key in keys]
     edges: list[tuple[int, int]] = []
@@ -85,6 +88,8 @@ def from_gtsam(factors: Any, values: Any) -> PoseGraph:
     num_priors = 0
     for number in range(factors.size()):
         factor = factors.at(number)
+        if factor is None:  # removed
+            continue
         if isinstance(factor, gtsam.PriorFactorPose2 | gtsam.PriorFactorPose3) and num_priors == 0:
             num_priors = 1
             continue
@@ -120,6 +125,15 @@ def load_gtsam() -> Any:
         return importlib.import_module("gtsam")
     except ModuleNotFoundError:
         raise InvalidInputError("expected GTSAM to be installed, got none; run pip install 'topobelief[gtsam]'") from None
+
+
+def _require_factors_and_values(gtsam: Any, factors: Any, values: Any) -> None:
+    if isinstance(factors, gtsam.NonlinearFactorGraph) and isinstance(values, gtsam.Values):
+        return
+    got = f"({type(factors).__name__}, {type(values).__name__})"
+    swapped = isinstance(factors, gtsam.Values) and isinstance(values, gtsam.NonlinearFactorGraph)
+    advice = "; swap the arguments" if swapped else ""
+    raise InvalidInputError(f"expected (NonlinearFactorGraph, Values), got {got}{advice}")
 
 
 def _to_pose(gtsam: Any, pose: list[float]) -> Any:

@@ -3,37 +3,48 @@
     VERTEX2 id x y theta
     EDGE2 i j x y theta I11 I12 I22 I33 I13 I23
 
-Note the order of the information. TORO files in 3D (VERTEX3, EDGE3) are refused: programs disagree whether their information
-is per Euler angle or per rotation vector, and a guess would silently change every weight.
+Note the order of the information; iSAM writes EDGE2 with I11 I12 I13 I22 I23 I33, which is an option. TORO files in 3D
+(VERTEX3, EDGE3) are refused: programs disagree whether their information is per Euler angle or per rotation vector, and a guess
+would silently change every weight.
 """
 
 from __future__ import annotations
+
+import re
+from typing import Unpack
 
 import numpy as np
 
 from topobelief.geometry import SE2_GROUP
 from topobelief.graph.pose_graph import PoseGraph
+from topobelief.io.dialect import Dialect, Tag, upper_triangle
 from topobelief.io.files import StrPath
-from topobelief.io.graph_lines import Dialect, Tag, read_lines
+from topobelief.io.graph_lines import read_lines
+from topobelief.io.reading import ReadingKeywords, ReadingOptions
 
 _SPACE = (
     "3D TORO files are not supported, because programs disagree about the meaning of their information; convert the file to g2o"
 )
-_LANDMARKS = "landmarks are not supported yet; remove the lines of landmarks and of their edges"
-_TORO = Dialect(
+TORO = Dialect(
+    name="TORO",
     tags={"VERTEX2": Tag("vertex", SE2_GROUP), "EDGE2": Tag("edge", SE2_GROUP)},
-    information_entries={SE2_GROUP.tangent_dim: (np.array([0, 0, 1, 2, 0, 1]), np.array([0, 1, 1, 2, 2, 2]))},
+    marks=re.compile(r"(VERTEX|EDGE)[23]|EQUIV|LANDMARK|BR"),
+    orders={
+        "toro": {SE2_GROUP.tangent_dim: (np.array([0, 0, 1, 2, 0, 1]), np.array([0, 1, 1, 2, 2, 2]))},
+        "isam": {SE2_GROUP.tangent_dim: upper_triangle(SE2_GROUP.tangent_dim)},
+    },
     refused={
         "VERTEX3": _SPACE,
         "EDGE3": _SPACE,
-        "EQUIV": "merging two poses into one is not supported; write an EDGE2 with high information instead",
-        "LANDMARK": _LANDMARKS,
-        "BR": _LANDMARKS,
+        **dict.fromkeys(
+            ("VERTEX_SE2", "EDGE_SE2", "VERTEX_SE3:QUAT", "EDGE_SE3:QUAT"),
+            "it belongs to the format g2o, and a file is in one format; read a g2o file with read_g2o or read_pose_graph",
+        ),
     },
 )
 
 
-def read_toro(path: StrPath) -> PoseGraph:
+def read_toro(path: StrPath, **options: Unpack[ReadingKeywords]) -> PoseGraph:
     """Read a planar pose graph from a TORO file.
 
     Ids, comments, FIX lines and poses without a VERTEX2 line are treated as `topobelief.read_g2o` does.
@@ -42,6 +53,9 @@ def read_toro(path: StrPath) -> PoseGraph:
     ----------
     path
         The file. Metres and radians.
+    **options
+        As for `topobelief.read_g2o`; `edge2_order="isam"` takes the information for the upper triangle row by row, as iSAM
+        writes EDGE2, and `drop="equiv"` ignores EQUIV lines.
 
     Raises
     ------
@@ -50,4 +64,4 @@ def read_toro(path: StrPath) -> PoseGraph:
     DisconnectedGraphError
         If poses without a VERTEX2 line are connected to none that has one; names some of them.
     """
-    return read_lines(path, _TORO)
+    return read_lines(path, (TORO,), ReadingOptions(**options)).warned()

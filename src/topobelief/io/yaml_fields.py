@@ -158,9 +158,13 @@ def read_fields(path: StrPath) -> Field:
     try:
         node = yaml.compose(text, Loader=yaml.SafeLoader)
     except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        reason = getattr(error, "problem", None) or "unreadable characters"
-        raise FileError(path, f"expected YAML, got other text: {reason}", line=mark.line + 1 if mark else None) from None
+        if not isinstance(error, yaml.MarkedYAMLError):
+            raise FileError(path, "expected YAML, got unreadable characters") from None
+        line = error.problem_mark.line + 1 if error.problem_mark else None
+        reason = " ".join(filter(None, (error.context, error.problem)))  # as in "while parsing a flow sequence expected ..."
+        raise FileError(path, f"expected YAML, got other text ({reason})", line=line) from None
+    except RecursionError:
+        raise FileError(path, "expected YAML, got brackets nested too deeply") from None
     if node is None:
         raise FileError(path, "expected YAML, got comments alone")
     return Field(path, "", node)

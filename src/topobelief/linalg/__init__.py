@@ -1,6 +1,7 @@
 """The only door to sparse factorisation: log-determinants of quadratic forms on graphs, with error estimates."""
 
 from topobelief.linalg.edge_form import EdgeForm, laplacian_form
-from topobelief.linalg.log_det import LogDet, LogDetSolver
+from topobelief.linalg.estimate import Estimate
+from topobelief.linalg.log_det import LogDetSolver
 
-__all__ = ["EdgeForm", "LogDet", "LogDetSolver", "laplacian_form"]
+__all__ = ["EdgeForm", "Estimate", "LogDetSolver", "laplacian_form"]

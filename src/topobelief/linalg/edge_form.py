@@ -27,8 +27,8 @@ class EdgeForm:
         The r rows of each edge on the b variables of its nodes.
     magnitude_i, magnitude_j : shape (m, b)
         Size of the terms from which each column was computed: its rounding error is a few units of roundoff times this.
-    root_error
-        What rounding in the square roots of the noise adds to the error of the log-determinant, nats.
+    root_errors : shape (m,), optional
+        What rounding in the square root of each edge's noise adds to the error of the log-determinant, nats. Default: nothing.
     multiplicity
         The matrix meant is M kron I_multiplicity.
     gauge_free
@@ -41,7 +41,7 @@ class EdgeForm:
     rows_j: FloatArray
     magnitude_i: FloatArray
     magnitude_j: FloatArray
-    root_error: float = 0.0
+    root_errors: FloatArray | None = None
     multiplicity: int = 1
     gauge_free: bool = False
 
@@ -65,7 +65,13 @@ class EdgeForm:
             rows_j=self.rows_j[which],
             magnitude_i=self.magnitude_i[which],
             magnitude_j=self.magnitude_j[which],
+            root_errors=None if self.root_errors is None else self.root_errors[which],
         )
+
+    @property
+    def root_error(self) -> float:
+        """Sum of `root_errors`."""
+        return 0.0 if self.root_errors is None else float(self.root_errors.sum())
 
     def strongest_node(self) -> int:
         """The node with the largest sum of squared rows: holding it leaves the best conditioned matrix."""

@@ -30,7 +30,7 @@ from topobelief.linalg.block_cholesky import (
 from topobelief.linalg.compiled import compiled, in_parallel, num_threads
 from topobelief.linalg.edge_form import EdgeForm
 from topobelief.linalg.elimination_tree import EliminationTree, with_ancestors
-from topobelief.linalg.log_det import UNIT_ROUNDOFF, LogDet
+from topobelief.linalg.estimate import UNIT_ROUNDOFF, Estimate
 from topobelief.linalg.orthogonal import triangle_of_more_rows
 from topobelief.linalg.strong_rows import StrongRows
 
@@ -39,6 +39,7 @@ _NUM_PROBES = 8
 _PROBE_SAFETY = 2.0
 _CONFIDENCE = 4.0
 _ASSEMBLY_OPERATIONS = 16
+_LEAST_WORK = 100_000  # block products below which a thread costs more than it saves
 
 
 class Paths(NamedTuple):
@@ -89,7 +90,7 @@ class FormFactor:
     tree: EliminationTree
     diagonal: FloatArray
     blocks: FloatArray
-    log_det: LogDet
+    log_det: Estimate[float]
 
     @staticmethod
     @np.errstate(over="ignore", divide="ignore", invalid="ignore")  # what is not finite has an infinite error
@@ -112,12 +113,12 @@ class FormFactor:
         entries = np.diagonal(diagonal, axis1=1, axis2=2).copy()
         done = np.zeros(n, np.bool_) if known is None else known.copy_to(tree, diagonal, blocks)
         if not factorize((0,) * b, tree.start, tree.rows, done, diagonal, blocks):
-            return FormFactor(tree, diagonal, blocks, LogDet(math.nan, math.inf))
+            return FormFactor(tree, diagonal, blocks, Estimate(math.nan, math.inf))
         log_pivots = 2 * np.log(np.diagonal(diagonal, axis1=1, axis2=2)).ravel()
-        factor = FormFactor(tree, diagonal, blocks, LogDet(math.fsum(log_pivots), 0.0))
+        factor = FormFactor(tree, diagonal, blocks, Estimate(math.fsum(log_pivots), 0.0))
         error = factor._rounding(form, entries, shift) + float(np.abs(log_pivots).sum())
         error = UNIT_ROUNDOFF * error + form.root_error
-        return FormFactor(tree, diagonal, blocks, LogDet(factor.log_det.value, error if math.isfinite(error) else math.inf))
+        return FormFactor(tree, diagonal, blocks, Estimate(factor.log_det.value, error if math.isfinite(error) else math.inf))
 
     @staticmethod
     @np.errstate(over="ignore", divide="ignore", invalid="ignore")
@@ -168,7 +169,7 @@ class FormFactor:
         log_pivots = 2 * np.log(np.diagonal(diagonal, axis1=1, axis2=2)).ravel()
         error = self.log_det.error + UNIT_ROUNDOFF * (error + float(np.abs(log_pivots).sum()))
         value = math.fsum(log_pivots) if math.isfinite(error) else math.nan
-        return FormFactor(tree, diagonal, blocks, LogDet(value, error if math.isfinite(error) else math.inf))
+        return FormFactor(tree, diagonal, blocks, Estimate(value, error if math.isfinite(error) else math.inf))
 
     def paths(self, places: IntArray) -> Paths:
         """Paths of some places, given in ascending order and without repetition.
@@ -197,6 +198,8 @@ class FormFactor:
         tree, parts = self.tree, num_threads()
         work = np.diff(tree.start) * (tree.depth + 1) * with_ancestors(tree.parent, places)
         total = np.cumsum(work)
+        if len(total) == 0 or total[-1] < _LEAST_WORK:
+            return [0, len(places)]
         cuts = np.searchsorted(total, total[-1:] * np.arange(1, parts) / parts)
         return [0, *np.searchsorted(places, cuts).tolist(), len(places)]
 
@@ -223,8 +226,7 @@ class FormFactor:
         """diag M^-1, shape (n, b): exact for small matrices, else from samples of covariance M^-1, with a safety factor."""
         tree, b = self.tree, self.block_size
         if tree.num_free * b <= _EXACT_VARIANCE_SIZE:
-            paths = self.paths(np.arange(tree.num_free))
-            return np.array([np.diagonal(paths.inverse_block(t, t)) for t in range(tree.num_free)]).reshape(-1, b)
+            return _squared_norms(self.paths(np.arange(tree.num_free)))
         rng = np.random.default_rng(0)
         num_edges, num_rows, _ = form.rows_i.shape
         samples = np.zeros((tree.num_free, b, _NUM_PROBES))
@@ -302,6 +304,20 @@ def changed_nodes(old: EdgeForm, new: EdgeForm, num_nodes: int, held: tuple[int,
 
 def _random_signs(rng: np.random.Generator, shape: tuple[int, ...]) -> FloatArray:
     return np.where(rng.integers(2, size=shape, dtype=np.int8), 1.0, -1.0)
+
+
+@compiled
+def _squared_norms(paths: Paths) -> FloatArray:
+    """Diagonal of M^-1 at some places, shape (w, b)."""
+    b = paths.block_size
+    norms = np.zeros((len(paths.places), b))
+    for k in range(len(norms)):
+        length = b * int(paths.lengths[k])
+        for c in range(b):
+            row = paths.values[paths.start[k] + c * length :]
+            for m in range(length):
+                norms[k, c] += row[m] * row[m]
+    return norms
 
 
 @compiled

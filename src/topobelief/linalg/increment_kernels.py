@@ -48,9 +48,10 @@ def add_increments(
     split
         Rows of a block that come first; 0 if the parts are not wanted.
     which : shape (any,)
-    out : shape (K, 6)
+    out : shape (K, 7)
         ln det T of the forest; ln det (I + R) of the closures; the same with the existing nodes held; with the first rows of
-        each block alone; with the others alone; what their error is proportional to. Zero on entry.
+        each block alone; with the others alone; by the chain rule (`chain_kernels`); what their error is proportional to. Zero
+        on entry.
     """
     r, b = rows_i.shape[1], rows_i.shape[2]
     for k in which:
@@ -59,7 +60,7 @@ def add_increments(
         forest = new_forest(num_new, b, shift)
         blocks = new_blocks(2 * num_edges if r > b or shift > 0 else num_edges - num_new, b)
         count = reduce_closures(extensions, k, rows_i, rows_j, forest, blocks)
-        out[k, 0], out[k, 5], count = eliminate_forest(extensions, k, rows_i, rows_j, forest, blocks, count)
+        out[k, 0], out[k, 6], count = eliminate_forest(extensions, k, rows_i, rows_j, forest, blocks, count)
         if count == 0:
             continue
         columns = compress_forest(extensions, k, forest, blocks, count)
@@ -74,7 +75,7 @@ def add_increments(
                     total += row[m] * other[m]
                 matrix[p, q] = total
             matrix[p, p] += 1.0
-            out[k, 5] += matrix[p, p]
+            out[k, 6] += matrix[p, p]
         out[k, 2] = cholesky_log_det(matrix.copy())
         sizes = add_existing(blocks, count, path_of, paths, matrix)
         if split:
@@ -83,7 +84,7 @@ def add_increments(
         out[k, 1] = cholesky_log_det(matrix)
         variances = inverse_diagonal(matrix)
         for p in range(count * b):
-            out[k, 5] += variances[p] * sizes[p]
+            out[k, 6] += variances[p] * sizes[p]
 
 
 @compiled
@@ -94,31 +95,15 @@ def add_existing(blocks: Blocks, count: int, path_of: IntArray, paths: Paths, ma
     """
     b = blocks.rows.shape[2]
     sizes = np.zeros(count * b)
-    sites, num_sites = np.empty(2 * count, np.int64), 0  # paths, ascending
-    for q in range(count):
-        for side in range(2):
-            path = path_of[blocks.ends[q, side]] if blocks.ends[q, side] >= 0 else -1
-            blocks.ends[q, side] = path
-            at = num_sites
-            while at > 0 and sites[at - 1] > path:
-                at -= 1
-            if path < 0 or (at > 0 and sites[at - 1] == path):
-                continue
-            for site in range(num_sites, at, -1):
-                sites[site] = sites[site - 1]
-            sites[at] = path
-            num_sites += 1
+    sites = touched_sites(blocks, count, path_of)
+    num_sites = len(sites)
     if num_sites == 0:
         return sizes
-    inverse = inverse_at(sites[:num_sites], paths)
+    inverse = inverse_at(sites, paths)
     product = np.zeros((count * b, b * num_sites))  # A M^-1
     for q in range(count):
         for side in range(2):
-            site = 0
-            while blocks.ends[q, side] >= 0 and sites[site] != blocks.ends[q, side]:
-                site += 1
-            if blocks.ends[q, side] >= 0:
-                blocks.ends[q, side] = b * site
+            blocks.ends[q, side] = b * blocks.ends[q, side]
         for c in range(b):
             row, spread = product[q * b + c], 0.0
             for side in range(2):
@@ -141,16 +126,50 @@ def add_existing(blocks: Blocks, count: int, path_of: IntArray, paths: Paths, ma
 
 
 @compiled
+def touched_sites(blocks: Blocks, count: int, path_of: IntArray) -> IntArray:
+    """Paths of the existing nodes that blocks touch, ascending; the blocks' ends become places in that list (-1: none)."""
+    sites, num_sites = np.empty(2 * count, np.int64), 0
+    for q in range(count):
+        for side in range(2):
+            path = path_of[blocks.ends[q, side]] if blocks.ends[q, side] >= 0 else -1
+            blocks.ends[q, side] = path
+            at = num_sites
+            while at > 0 and sites[at - 1] > path:
+                at -= 1
+            if path < 0 or (at > 0 and sites[at - 1] == path):
+                continue
+            for site in range(num_sites, at, -1):
+                sites[site] = sites[site - 1]
+            sites[at] = path
+            num_sites += 1
+    for q in range(count):
+        for side in range(2):
+            site = 0
+            while blocks.ends[q, side] >= 0 and sites[site] != blocks.ends[q, side]:
+                site += 1
+            if blocks.ends[q, side] >= 0:
+                blocks.ends[q, side] = site
+    return sites[:num_sites].copy()
+
+
+@compiled
+def site_gaps(sites: IntArray, paths: Paths) -> IntArray:
+    """How many nodes the paths of each site and of the next one have in common."""
+    gap = np.empty(len(sites), np.int64)
+    for t in range(1, len(sites)):
+        gap[t - 1] = paths.shared[sites[t - 1]]
+        for path in range(sites[t - 1] + 1, sites[t]):
+            gap[t - 1] = min(gap[t - 1], paths.shared[path])
+    return gap
+
+
+@compiled
 def inverse_at(sites: IntArray, paths: Paths) -> FloatArray:
     """M^-1 at some nodes, given by their paths in ascending order; shape (len(sites) b, len(sites) b)."""
     b, count = paths.block_size, len(sites)
     inverse, block = np.empty((b * count, b * count)), np.empty((b, b))
-    gap = np.empty(count, np.int64)  # what neighbours among the sites share
+    gap = site_gaps(sites, paths)
     for t in range(count):
-        if t:
-            gap[t - 1] = paths.shared[sites[t - 1]]
-            for path in range(sites[t - 1] + 1, sites[t]):
-                gap[t - 1] = min(gap[t - 1], paths.shared[path])
         right, common = sites[t], paths.lengths[sites[t]]
         for s in range(t, -1, -1):
             left = sites[s]

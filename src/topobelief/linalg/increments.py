@@ -18,19 +18,22 @@ about the sum of ((I + R)^-1)_pp S_p; ln det T by the condition numbers of the t
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from topobelief.arrays import FloatArray, IntArray
+from topobelief.linalg.chain_kernels import add_chained_increments
 from topobelief.linalg.compiled import compiled, in_parallel, num_threads, unset
 from topobelief.linalg.edge_form import EdgeForm
 from topobelief.linalg.elimination_paths import FormFactor, Paths
+from topobelief.linalg.estimate import UNIT_ROUNDOFF
 from topobelief.linalg.extensions import Extensions
 from topobelief.linalg.increment_kernels import add_diagonal_increments, add_increments
-from topobelief.linalg.log_det import UNIT_ROUNDOFF
 
 _PATH_NUMBERS = 8_000_000  # numbers a variable of a node that the paths of one group of extensions may take: 64 MB
 _PARTS_PER_THREAD = 4
+_LEAST_EDGES = 2000  # below so many edges of extensions a thread costs more than it saves
 _OPERATIONS = 32  # roundings behind one term of R
 _may_overflow = np.errstate(over="ignore", invalid="ignore")  # what is not finite is refused
 
@@ -48,11 +51,13 @@ class Increments:
     closures_held : shape (K,)
         ln det (I + V V^T): existing nodes held.
     first_rows, other_rows : shape (K,)
-        ln det (I + R) of the first rows of each closure alone, and of the others; 0 where `split` is.
+        ln det (I + R) of the first rows of each closure alone, and of the others.
+    chained : shape (K,)
+        Sum over the closures, in the order of the path, of ln det of their conditional covariance given those of a window.
     error : shape (K,)
         Rounding of the sum, beyond twice the error of ln det M.
-    split
-        How many of a closure's rows come first; 0 where the parts were not asked for.
+
+    What was not asked for is nan.
     """
 
     forest: FloatArray
@@ -60,13 +65,23 @@ class Increments:
     closures_held: FloatArray
     first_rows: FloatArray
     other_rows: FloatArray
+    chained: FloatArray
     error: FloatArray
-    split: int
+
+
+Wanted = Literal["closures", "parts"] | int
+"""ln det (I + R); also of the first rows of each closure and of the others; or, for a window, `chained` and `other_rows`."""
 
 
 @_may_overflow
 def log_det_increments(
-    factor: FormFactor | None, extensions: Extensions, form: EdgeForm, *, shift: float = 0.0, split: int = 0
+    factor: FormFactor | None,
+    extensions: Extensions,
+    form: EdgeForm,
+    *,
+    shift: float = 0.0,
+    wanted: Wanted = "closures",
+    first_rows: int = 0,
 ) -> Increments:
     """Increments of ln det M by each extension.
 
@@ -79,10 +94,12 @@ def log_det_increments(
         Rows of the extensions' edges.
     shift
         As in the factor: added to the diagonal of new nodes.
-    split
-        If not 0: also for the first `split` rows of each closure alone and for the others; square rows only.
+    wanted
+        For parts and a window, rows are square and no row of a closure but the first ones touches variables of their number.
+    first_rows
+        How many of a closure's rows come first.
     """
-    out = np.zeros((extensions.num_extensions, 6))
+    out = np.zeros((extensions.num_extensions, 7))
     rows_i, rows_j = np.ascontiguousarray(form.rows_i), np.ascontiguousarray(form.rows_j)
     path_of = np.full(extensions.num_existing, -1)
 
@@ -90,16 +107,27 @@ def log_det_increments(
         paths = _no_paths(form.block_size) if factor is None else _paths(factor, extensions, which, path_of)
 
         def add(first: int, last: int) -> None:
-            add_increments(extensions, rows_i, rows_j, shift, path_of, paths, split, which[first:last], out)
+            part = which[first:last]
+            if isinstance(wanted, int):
+                add_chained_increments(extensions, rows_i, rows_j, path_of, paths, first_rows, wanted, part, out)
+            else:
+                split = first_rows if wanted == "parts" else 0
+                add_increments(extensions, rows_i, rows_j, shift, path_of, paths, split, part, out)
 
-        parts = min(len(which), _PARTS_PER_THREAD * num_threads())
+        parts = min(len(which), _PARTS_PER_THREAD * num_threads()) if len(extensions.edges) >= _LEAST_EDGES else 1
         in_parallel(add, np.linspace(0, len(which), parts + 1).astype(int).tolist())
 
     for which in [np.arange(extensions.num_extensions)] if factor is None else _groups(factor, extensions):
         add_group(which)
-    forest, closures, held, first_rows, other_rows, size = np.ascontiguousarray(out.T)
-    error = UNIT_ROUNDOFF * (_OPERATIONS * size + np.abs(forest) + np.abs(closures)) + form.root_error
-    return Increments(forest, closures, held, first_rows, other_rows, error, split)
+    forest, closures, held, first, others, chained, size = np.ascontiguousarray(out.T)
+    error = UNIT_ROUNDOFF * (_OPERATIONS * size + np.abs(forest) + np.abs(closures) + np.abs(chained))
+    error += _root_errors(form, extensions)
+    unknown = np.full(extensions.num_extensions, np.nan)
+    if isinstance(wanted, int):
+        return Increments(forest, unknown, unknown, unknown, others, chained, error)
+    if wanted == "closures":
+        first = others = unknown
+    return Increments(forest, closures, held, first, others, unknown, error)
 
 
 @_may_overflow
@@ -128,7 +156,15 @@ def diagonal_increments(
     rows_i, rows_j = np.ascontiguousarray(form.rows_i), np.ascontiguousarray(form.rows_j)
     add_diagonal_increments(extensions, rows_i, rows_j, shift, diagonal, held, out)
     terms = 2 * np.diff(extensions.edge_start) * b * b
-    return out, UNIT_ROUNDOFF * (_OPERATIONS * terms + np.abs(out)) + form.root_error
+    return out, UNIT_ROUNDOFF * (_OPERATIONS * terms + np.abs(out)) + _root_errors(form, extensions)
+
+
+def _root_errors(form: EdgeForm, extensions: Extensions) -> FloatArray:
+    """Sum of the form's root errors over the edges of each extension, shape (K,)."""
+    if form.root_errors is None:
+        return np.zeros(extensions.num_extensions)
+    which = np.repeat(np.arange(extensions.num_extensions), np.diff(extensions.edge_start))
+    return np.bincount(which, weights=form.root_errors, minlength=extensions.num_extensions).astype(np.float64)
 
 
 def _no_paths(block_size: int) -> Paths:

@@ -27,15 +27,12 @@ import qdldl
 from scipy import sparse
 
 from topobelief.arrays import BoolArray, FloatArray, IntArray
-from topobelief.errors import IllConditionedError
 from topobelief.linalg.block_pattern import BlockPattern
 from topobelief.linalg.blocks import CutGraph
 from topobelief.linalg.edge_form import EdgeForm
-from topobelief.linalg.orthogonal import ASSEMBLY_OPERATIONS, UNIT_ROUNDOFF, log_det_by_qr, log_dets_of_squares
+from topobelief.linalg.estimate import UNIT_ROUNDOFF, Estimate
+from topobelief.linalg.orthogonal import ASSEMBLY_OPERATIONS, log_det_by_qr, log_dets_of_squares
 from topobelief.linalg.strong_rows import StrongRows, log_det_of_covariance
-
-MAX_ERROR_NATS = 0.1
-"""An entropy or a signature that is not known to this is refused: it could not rank candidates."""
 
 _QDLDL: Any = qdldl  # ships no types
 _EXACT_VARIANCE_SIZE = 200  # up to here the variances of the error estimate are exact
@@ -52,43 +49,7 @@ _SMALL_NODE_ERROR = 1e-8  # nats; beyond it the QR of a node's rows is worth its
 _OPERATIONS = 32  # roundings behind one term of the covariance of strong rows
 
 
-@dataclass(frozen=True, slots=True)
-class LogDet:
-    """A log-determinant and an estimate of its absolute rounding error, both in nats."""
-
-    value: float
-    error: float
-
-    def require_accuracy(self, what: str) -> LogDet:
-        """Itself, if its error is small enough to mean anything.
-
-        Raises
-        ------
-        IllConditionedError
-            If the error exceeds `MAX_ERROR_NATS`; says of `what`.
-        """
-        if not self.error <= MAX_ERROR_NATS:
-            raise IllConditionedError(what, self.error)
-        return self
-
-    def __add__(self, other: LogDet) -> LogDet:
-        return LogDet(self.value + other.value, self.error + other.error)
-
-    def __sub__(self, other: LogDet) -> LogDet:
-        return LogDet(self.value - other.value, self.error + other.error)
-
-    def __rmul__(self, factor: float) -> LogDet:
-        return LogDet(factor * self.value, abs(factor) * self.error)
-
-    def plus(self, constant: float) -> LogDet:
-        """A constant added, with the rounding that the sum costs."""
-        value = self.value + constant
-        if not math.isfinite(value):
-            return _UNKNOWN
-        return LogDet(value, self.error + UNIT_ROUNDOFF * (abs(constant) + abs(self.value) + abs(value)))
-
-
-_UNKNOWN = LogDet(math.nan, math.inf)
+_UNKNOWN = Estimate(math.nan, math.inf)
 _may_overflow = np.errstate(over="ignore", divide="ignore", invalid="ignore")  # what is not finite has an infinite error
 
 
@@ -117,13 +78,13 @@ class LogDetSolver:
         return int(self._free.sum())
 
     @_may_overflow
-    def log_det(self, form: EdgeForm, *, shift: float = 0.0) -> LogDet:
+    def log_det(self, form: EdgeForm, *, shift: float = 0.0) -> Estimate[float]:
         """ln det of the form's matrix plus `shift` times I, on the free nodes.
 
         0 where there are no free nodes; error inf where the factorisation breaks down.
         """
         if self._pattern(form.block_size).size == 0:
-            return LogDet(0.0, 0.0)
+            return Estimate(0.0, 0.0)
         result, blocks = self._by_sparse_factors(form, shift), None
         if result.error > _SMALL_ERROR and form.gauge_free and not shift:
             blocks = self._by_blocks(form)
@@ -131,11 +92,11 @@ class LogDetSolver:
         return form.multiplicity * result
 
     @_may_overflow
-    def hadamard(self, form: EdgeForm, *, shift: float = 0.0) -> LogDet:
+    def hadamard(self, form: EdgeForm, *, shift: float = 0.0) -> Estimate[float]:
         """Sum of ln det of the diagonal blocks, an upper bound of `log_det` (Hadamard and Fischer)."""
         pattern = self._pattern(form.block_size)
         if pattern.size == 0:
-            return LogDet(0.0, 0.0)
+            return Estimate(0.0, 0.0)
         blocks = pattern.diagonal_blocks(form) + shift * np.eye(form.block_size)
         scale = np.sqrt(np.diagonal(blocks, axis1=1, axis2=2))
         scaled = blocks / (scale[:, :, None] * scale[:, None, :])
@@ -151,20 +112,20 @@ class LogDetSolver:
             if better.error < errors[node]:
                 values[node], errors[node] = better.value, better.error
                 root_error = 2 * form.root_error  # an edge is seen at both ends
-        return form.multiplicity * _finite(LogDet(math.fsum(values), float(errors.sum()) + root_error))
+        return form.multiplicity * _finite(Estimate(math.fsum(values), float(errors.sum()) + root_error))
 
     def _pattern(self, block_size: int) -> BlockPattern:
         if block_size not in self._patterns:
             self._patterns[block_size] = BlockPattern.build(self._edges, self._free, block_size)
         return self._patterns[block_size]
 
-    def _by_sparse_factors(self, form: EdgeForm, shift: float) -> LogDet:
+    def _by_sparse_factors(self, form: EdgeForm, shift: float) -> Estimate[float]:
         """By one factor, and with strong rows apart where the error makes that worth its time."""
         factor = self._factor(form, shift)
         known = _UNKNOWN if factor is None else factor.log_det
         return known if known.error <= _LARGE_ERROR else _better(known, self._by_strong_rows(form, shift))
 
-    def _by_blocks(self, form: EdgeForm) -> LogDet | None:
+    def _by_blocks(self, form: EdgeForm) -> Estimate[float] | None:
         """The sum over the blocks of the graph, the strongest node of each held where there is a choice.
 
         None where the graph is hardly more than one block that holds the same node.
@@ -178,23 +139,23 @@ class LogDetSolver:
         largest = np.argmax(np.bincount(cut.block_of_node))
         if cut.node[held[largest]] == len(self._free) and np.mean(cut.block_of_edge == largest) > _WHOLE_SHARE:
             return None
-        rows = replace(form.between(cut.kept, cut.edges), root_error=0.0)
+        rows = replace(form.between(cut.kept, cut.edges), root_errors=None)
         apart = cut.is_bridge & (form.rows_i.shape[1] == form.block_size)
         value, error = log_dets_of_squares(*_rows_at_free_ends(rows, held[cut.block_of_edge], apart))
-        total = LogDet(value, UNIT_ROUNDOFF * error + form.root_error)
+        total = Estimate(value, UNIT_ROUNDOFF * error + form.root_error)
         rest = np.flatnonzero(~apart)
         if len(rest) == 0:
             return _finite(total)
         solver, part = _part(rows, rest, held)
         known = solver._by_sparse_factors(part, 0.0)
         if known.error > _SMALL_ERROR:
-            known = LogDet(0.0, 0.0)
+            known = Estimate(0.0, 0.0)
             for block in np.split(rest, _changes(cut.block_of_edge[rest])):
                 solver, part = _part(rows, block, held)
                 known += solver._or_by_qr(solver._by_sparse_factors(part, 0.0), part, 0.0)
-        return _finite(total.plus(known.value) + LogDet(0.0, known.error))
+        return _finite(total.plus(known.value) + Estimate(0.0, known.error))
 
-    def _or_by_qr(self, known: LogDet, form: EdgeForm, shift: float) -> LogDet:
+    def _or_by_qr(self, known: Estimate[float], form: EdgeForm, shift: float) -> Estimate[float]:
         """`known`, or what is known better by QR, as far as the error makes that worth its time."""
         pattern = self._pattern(form.block_size)
         limit = _LARGE_ERROR
@@ -202,10 +163,10 @@ class LogDetSolver:
             limit = _SMALL_RELATIVE_ERROR * max(1.0, abs(known.value))
         if pattern.size <= _QR_SIZE and not known.error <= limit:
             by_qr = _by_qr(pattern.dense_rows(form), pattern.magnitude(form), shift)
-            known = _better(known, LogDet(by_qr.value, by_qr.error + form.root_error))
+            known = _better(known, Estimate(by_qr.value, by_qr.error + form.root_error))
         return known
 
-    def _by_strong_rows(self, form: EdgeForm, shift: float) -> LogDet:
+    def _by_strong_rows(self, form: EdgeForm, shift: float) -> Estimate[float]:
         """The other rows factored, the strong ones added to that."""
         pattern, strong = self._pattern(form.block_size), StrongRows.of(form)
         others = None if strong is None else self._factor(strong.weakened, shift)
@@ -216,7 +177,7 @@ class LogDetSolver:
         solutions = np.stack([others.solve(row) for row in rows], axis=1)
         value, error = log_det_of_covariance(rows, sizes, solutions, np.sqrt(others.variances))
         error = UNIT_ROUNDOFF * (_OPERATIONS * error + abs(value))
-        return _finite(LogDet(others.log_det.value + value, 2 * others.log_det.error + error))
+        return _finite(Estimate(others.log_det.value + value, 2 * others.log_det.error + error))
 
     def _factor(self, form: EdgeForm, shift: float) -> _Factor | None:
         """None where a pivot is not positive, or nothing is known of the error."""
@@ -231,39 +192,39 @@ class LogDetSolver:
             self._factors.pop(pattern.block_size, None)
             return None
         factor = self._factors[pattern.block_size]
-        lower, pivots, order = _factor_parts(factor)
+        lower, pivots, order = factor_parts(factor)
         if not (pivots > 0).all():
             return None
         log_pivots = np.log(pivots)
         variances = _variances(factor, form, pattern, shift)
-        error = _factor_error(upper, lower, order, pattern.magnitude(form), variances, form.block_size)
+        error = factor_error(upper, lower, order, pattern.magnitude(form), variances, form.block_size)
         error = UNIT_ROUNDOFF * (error + float(np.abs(log_pivots).sum())) + form.root_error
-        return _Factor(LogDet(math.fsum(log_pivots), error), variances, factor.solve) if math.isfinite(error) else None
+        return _Factor(Estimate(math.fsum(log_pivots), error), variances, factor.solve) if math.isfinite(error) else None
 
 
 @dataclass(frozen=True, slots=True)
 class _Factor:
     """What is known of a factored matrix M."""
 
-    log_det: LogDet
+    log_det: Estimate[float]
     variances: FloatArray  # diag M^-1, estimated
     solve: Callable[[FloatArray], FloatArray]  # until the solver factors another matrix
 
 
-def _better(first: LogDet, second: LogDet) -> LogDet:
+def _better(first: Estimate[float], second: Estimate[float]) -> Estimate[float]:
     return min(first, second, key=lambda candidate: candidate.error)
 
 
-def _finite(estimate: LogDet) -> LogDet:
+def _finite(estimate: Estimate[float]) -> Estimate[float]:
     return estimate if math.isfinite(estimate.value) and math.isfinite(estimate.error) else _UNKNOWN
 
 
-def _by_qr(rows: FloatArray, magnitudes: FloatArray, shift: float) -> LogDet:
+def _by_qr(rows: FloatArray, magnitudes: FloatArray, shift: float) -> Estimate[float]:
     """ln det (R^T R + shift I), `magnitudes` the squared sizes of the terms behind each column."""
     if shift:
         rows = np.concatenate([rows, math.sqrt(shift) * np.eye(rows.shape[1])])
     value, error = log_det_by_qr(rows, np.sqrt(magnitudes))
-    return _finite(LogDet(value, UNIT_ROUNDOFF * error))
+    return _finite(Estimate(value, UNIT_ROUNDOFF * error))
 
 
 def _rows_at_free_ends(form: EdgeForm, held: IntArray, which: BoolArray) -> tuple[FloatArray, FloatArray]:
@@ -285,7 +246,7 @@ def _changes(values: IntArray) -> IntArray:
     return np.flatnonzero(np.diff(values)) + 1
 
 
-def _factor_parts(factor: Any) -> tuple[sparse.csc_array, FloatArray, IntArray]:
+def factor_parts(factor: Any) -> tuple[sparse.csc_array, FloatArray, IntArray]:
     """Strict lower triangle, pivots, and the order in which variables were eliminated."""
     lower, pivots, order = factor.factors()
     return sparse.csc_array(lower), np.asarray(pivots), np.asarray(order, dtype=np.int64)
@@ -297,20 +258,20 @@ def _variances(factor: Any, form: EdgeForm, pattern: BlockPattern, shift: float)
         return np.array([factor.solve(unit)[i] for i, unit in enumerate(np.eye(pattern.size))])
     rng = np.random.default_rng(0)
     num_edges, num_rows, _ = form.rows_i.shape
-    samples = pattern.rows_transposed_times(form, _random_signs(rng, (num_edges, num_rows, _NUM_PROBES)))
+    samples = pattern.rows_transposed_times(form, random_signs(rng, (num_edges, num_rows, _NUM_PROBES)))
     if shift:
-        samples += math.sqrt(shift) * _random_signs(rng, samples.shape)
+        samples += math.sqrt(shift) * random_signs(rng, samples.shape)
     squares = np.zeros(pattern.size)
     for sample in samples.T:
         squares += factor.solve(sample) ** 2
     return _PROBE_SAFETY / _NUM_PROBES * squares
 
 
-def _random_signs(rng: np.random.Generator, shape: tuple[int, ...]) -> FloatArray:
+def random_signs(rng: np.random.Generator, shape: tuple[int, ...]) -> FloatArray:
     return np.where(rng.integers(2, size=shape, dtype=np.int8), 1.0, -1.0)
 
 
-def _factor_error(
+def factor_error(
     upper: sparse.csc_array,
     lower: sparse.csc_array,
     order: IntArray,

@@ -13,8 +13,8 @@ import numpy as np
 from scipy import linalg
 
 from topobelief.arrays import FloatArray, IntArray
+from topobelief.linalg.estimate import UNIT_ROUNDOFF
 
-UNIT_ROUNDOFF = float(np.finfo(np.float64).eps) / 2
 ASSEMBLY_OPERATIONS = 16  # roundings behind one term of a row
 
 

@@ -6,18 +6,20 @@ decision of each kind meets them all; it takes half a minute, or an instant if i
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from topobelief.geometry import SE2_GROUP, SE3_GROUP, Group
 from topobelief.graph.action import Action, posterior
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.planning.evaluation import SignatureName
-from topobelief.planning.incremental import IncrementalEvaluation
+from topobelief.planning.planner import Planner
 
-_CHOICES: tuple[tuple[SignatureName, str, str], ...] = (
-    ("spanning_trees", "fischer", "cholesky"),
-    ("spanning_trees", "anchored", "cholesky"),
-    ("von_neumann_approx", "fischer", "hadamard"),
+_CHOICES: tuple[dict[str, Any], ...] = (
+    {"bounds": "fischer"},
+    {"bounds": "anchored"},
+    {"bounds": "chain"},
+    {"signature": "von_neumann_approx", "determinant": "hadamard"},
 )
 
 
@@ -28,16 +30,15 @@ def compile_kernels() -> None:
             graph, action = _ring(group, coupling)
             grown = posterior(graph, action)
             revisit = Action(grown.poses[:0], action.edges[:1], action.information[0])
-            for signature, family, determinant in _CHOICES:
-                evaluation = IncrementalEvaluation(graph, "map", signature, False, family, determinant, 0)
-                _evaluate(evaluation, action)
-                _evaluate(evaluation.extended(grown, 0), revisit)
+            for choice in _CHOICES:
+                planner = Planner(graph, objective="map", engine="incremental", anchor=0, **choice)
+                _evaluate(planner, action)
+                _evaluate(planner.extended(grown), revisit)
 
 
-def _evaluate(evaluation: IncrementalEvaluation, action: Action) -> None:
-    evaluation.signatures([action])
-    evaluation.bounds([action])
-    evaluation.entropies([action])
+def _evaluate(planner: Planner, action: Action) -> None:
+    planner.decide([action])
+    planner.entropies([action])
 
 
 def _ring(group: Group, coupling: float, *, num_poses: int = 70) -> tuple[PoseGraph, Action]:

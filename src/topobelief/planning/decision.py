@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from topobelief.arrays import FloatArray, IntArray, frozen_floats, frozen_ints
+from topobelief.arrays import FloatArray, IntArray, ReadOnlyArrays, frozen_floats, frozen_ints
 from topobelief.errors import InvalidInputError
 
-SCHEMA = "topobelief.decision/1"
+SCHEMA = "topobelief.decision/2"
 
 _SIGNATURE_NAMES = {
     "spanning_trees": "spanning trees",
@@ -28,12 +28,12 @@ class Candidate:
     label: str
     num_new_poses: int
     num_closures: int
-    length: float  # metres, along the new poses from the graph's last one
+    length: float  # metres, of the path that the robot drives
     cost: float  # nats
 
 
 @dataclass(frozen=True, eq=False)
-class Decision:
+class Decision(ReadOnlyArrays):
     """The outcome of `Planner.decide` over K actions.
 
     Attributes
@@ -41,7 +41,7 @@ class Decision:
     best : int
         The chosen action: the first of the ranking, or the one of least J once evaluated.
     ranking : shape (K,), int
-        All K actions, best signature first (signature - cost for spanning trees); ties by index.
+        All K actions, best signature first (signature - cost for spanning trees), compared to 32 binary digits; ties by index.
     signatures : shape (K,)
         Raw signatures.
     lower, upper : shape (K,)
@@ -56,7 +56,7 @@ class Decision:
     margin_met : bool or None
         Whether the upper bound of the best lies below the margin; None where no margin was given.
     num_evaluations : int
-        Exact evaluations made.
+        Exact evaluations made; actions that add the same poses and measurements share one.
     proven_optimal : bool
     candidates : tuple of Candidate
     objective, signature, bounds, determinant : str
@@ -100,8 +100,9 @@ class Decision:
         candidate, total = self.candidates[self.best], self.num_actions
         poses = f"{candidate.num_new_poses} new poses, " if candidate.num_new_poses else ""
         first = self.name(self.best)
+        of_total = f" of {total}" if total > 1 else ""
         sentences = [
-            f"{first[:1].upper()}{first[1:]} of {total} ({candidate.length:.1f} m, {poses}"
+            f"{first[:1].upper()}{first[1:]}{of_total} ({candidate.length:.1f} m, {poses}"
             f"{candidate.num_closures} loop closures) {self._claim()}"
         ]
         unit = " per pose" if self.objective == "per_pose" else ""
@@ -116,13 +117,15 @@ class Decision:
                 f"{ruled_out} {'was' if ruled_out == 1 else 'were'} ruled out by bounds."
             )
         elif self.proven_optimal and total > 1:
-            count = self.num_evaluations
-            spared = f"; bounds ruled out the other {total - count}" if 0 < count < total else ""
+            count, spared = self.num_evaluations, int(np.isnan(self.entropies).sum())
+            spared = f"; bounds ruled out the other {spared}" if count and spared else ""
             evaluated = f"{count} exact evaluation{'s' if count > 1 else ''}" if count else "bounds alone"
             sentences.append(f"That is proven by {evaluated}{spared}.")
         return " ".join(sentences)
 
     def _claim(self) -> str:
+        if self.num_actions == 1:
+            return "is the only candidate: there is nothing to choose from."
         by = _SIGNATURE_NAMES.get(self.signature, self.signature)
         if self.proven_optimal:
             return f"is optimal ({self.objective} entropy)."
@@ -154,7 +157,7 @@ class Decision:
         return "\n".join([self.summary(), "", *lines])
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values for JSON. Numbers that JSON lacks are the strings "nan", "inf" and "-inf"."""
+        """Plain values for JSON. What is not known (nan, or an infinite bound) is None; actions come by index."""
         return {
             "schema": SCHEMA,
             "best": self.best,
@@ -170,6 +173,7 @@ class Decision:
             "survivors": self.survivors.tolist(),
             "actions": [
                 {
+                    "index": index,
                     "label": candidate.label,
                     "num_new_poses": candidate.num_new_poses,
                     "num_closures": candidate.num_closures,
@@ -199,7 +203,7 @@ class Decision:
         try:
             actions: Sequence[Mapping[str, Any]] = data["actions"]
             columns = {
-                name: np.array([float(action[key]) for action in actions])
+                name: np.array([_from_json(action[key], unknown=math.nan) for action in actions])
                 for name, key in (
                     ("signatures", "signature"),
                     ("lower", "lower"),
@@ -214,7 +218,7 @@ class Decision:
                 best=data["best"],
                 ranking=np.array(data["ranking"], dtype=np.int64),
                 survivors=np.array(data["survivors"], dtype=np.int64),
-                error_bound=float(data["error_bound"]),
+                error_bound=_from_json(data["error_bound"], unknown=math.inf),
                 margin_met=data["margin_met"],
                 num_evaluations=data["num_evaluations"],
                 proven_optimal=data["proven_optimal"],
@@ -236,5 +240,9 @@ def _readable(nats: float) -> str:
     return f"{nats:.0f}" if nats >= 100 else f"{nats:.1f}" if nats >= 1 else f"{nats:.2g}"
 
 
-def _json_number(value: float) -> float | str:
-    return float(value) if math.isfinite(value) else str(float(value))
+def _json_number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _from_json(value: float | None, *, unknown: float) -> float:
+    return unknown if value is None else float(value)

@@ -11,6 +11,7 @@ order violation between two actions, or the whole of it where the pinned action 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,7 +30,7 @@ class DecisionQuality:
     Attributes
     ----------
     error
-        epsilon, nats: what choosing by signature loses.
+        epsilon, nats: what choosing by signature loses; inf where that is more than the largest double.
     gamma
         Nats: how far the order of all actions is from being kept.
     action_consistent, order_consistent
@@ -73,20 +74,23 @@ def decision_quality(entropies: ArrayLike, signatures: ArrayLike) -> DecisionQua
         raise InvalidInputError(f"expected entropies and signatures of one shape (K,), K >= 1, got {J.shape} and {s.shape}")
     if not (np.isfinite(J).all() and np.isfinite(s).all()):
         raise InvalidInputError("expected finite entropies and signatures, got nan or inf; evaluate every action first")
-    chosen = int(np.argmax(s))
-    error = float(J[chosen] - J.min())
-    gamma = max(_worst_violation(J, s) / 2, _pinned_violation(J, s, chosen))
-    tolerance = _RELATIVE_TOLERANCE * float(np.abs(J).max())
     spearman, kendall, pearson = _correlations(J, -s)
-    return DecisionQuality(error, gamma, error <= tolerance, gamma <= tolerance, spearman, kendall, pearson)
+    scaled, exponent = _moderate(J)
+    chosen = int(np.argmax(s))
+    error = float(scaled[chosen] - scaled.min())
+    gamma = max(_worst_violation(scaled, s) / 2, _pinned_violation(scaled, s, chosen))
+    tolerance = _RELATIVE_TOLERANCE * float(np.abs(scaled).max())
+    with np.errstate(over="ignore"):
+        error_nats, gamma_nats = np.ldexp([error, gamma], exponent).tolist()
+    return DecisionQuality(error_nats, gamma_nats, error <= tolerance, gamma <= tolerance, spearman, kendall, pearson)
 
 
 def rank_correlation(a: ArrayLike, b: ArrayLike) -> float:
     """Spearman's rank correlation; nan where an input is constant or has fewer than two values."""
     first, second = _mean_ranks(a), _mean_ranks(b)
     if len(first) < 2 or np.ptp(first) == 0 or np.ptp(second) == 0:
-        return float("nan")
-    return float(np.corrcoef(first, second)[0, 1])
+        return math.nan
+    return _correlation(first, second)
 
 
 def _mean_ranks(values: ArrayLike) -> FloatArray:
@@ -110,10 +114,37 @@ def _pinned_violation(J: FloatArray, s: FloatArray, chosen: int) -> float:
 
 
 def _correlations(a: FloatArray, b: FloatArray) -> tuple[float, float, float]:
-    if len(a) < 2 or np.ptp(a) == 0 or np.ptp(b) == 0:
-        return float("nan"), float("nan"), float("nan")
+    """Spearman's, Kendall's and Pearson's; nan where an input is constant."""
+    if len(np.unique(a)) < 2 or len(np.unique(b)) < 2:
+        return math.nan, math.nan, math.nan
+    return rank_correlation(a, b), _kendall(a, b), _correlation(_from_zero_to_one(a), _from_zero_to_one(b))
+
+
+def _correlation(a: FloatArray, b: FloatArray) -> float:
+    """Pearson's correlation; exactly 1 for equal inputs, since the root of a square is exact."""
+    a, b = a - a.mean(), b - b.mean()
+    return min(1.0, max(-1.0, float(a @ b) / math.sqrt(float(a @ a) * float(b @ b))))
+
+
+def _kendall(a: FloatArray, b: FloatArray) -> float:
+    """Kendall's tau_b, without the rounding of SciPy's: concordant less discordant pairs are a whole number."""
     from scipy import stats  # heavy, and needed only when quality is asked for
 
-    kendall = float(stats.kendalltau(a, b).statistic)
-    scaled = [(values - values.mean()) / np.ptp(values) for values in (a, b)]  # whatever the unit, nothing overflows
-    return rank_correlation(a, b), kendall, float(np.corrcoef(*scaled)[0, 1])
+    scale = math.sqrt(_num_untied_pairs(a) * _num_untied_pairs(b))
+    return round(float(stats.kendalltau(a, b).statistic) * scale) / scale
+
+
+def _num_untied_pairs(values: FloatArray) -> int:
+    counts = np.unique(values, return_counts=True)[1]
+    return (len(values) ** 2 - int(np.sum(counts**2))) // 2
+
+
+def _from_zero_to_one(values: FloatArray) -> FloatArray:
+    moderate, _ = _moderate(values)
+    return (moderate - moderate.min()) / np.ptp(moderate)
+
+
+def _moderate(values: FloatArray) -> tuple[FloatArray, int]:
+    """Values between -1/2 and 1/2, whose differences cannot overflow, and the power of two by which they were divided."""
+    exponent = int(np.frexp(np.abs(values).max())[1]) + 1
+    return np.ldexp(values, -exponent), exponent

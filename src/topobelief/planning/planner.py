@@ -12,38 +12,41 @@ by a von Neumann signature too. The proof evaluates J along the ranking and skip
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from topobelief.arrays import FloatArray
-from topobelief.bounds.entropy_bounds import Determinant
+from topobelief.bounds.options import BoundOptions, Determinant
 from topobelief.bounds.paper import require_equal_noise
 from topobelief.errors import InvalidActionError, InvalidGraphError, InvalidInputError, require_choice
-from topobelief.graph.action import Action, check_actions, posterior
-from topobelief.graph.fisher import fisher_rows
+from topobelief.graph.action import Action, check_actions
+from topobelief.graph.fit import warn_of_misfit
 from topobelief.graph.information import SAME_NOISE, shared_information
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.graph.topology import checked_anchor
+from topobelief.planning.batch import Batch, Criteria
 from topobelief.planning.decision import Decision
-from topobelief.planning.evaluation import Evaluation, ScratchEvaluation, SignatureName
-from topobelief.planning.objectives import ObjectiveName
-from topobelief.planning.search import Clock, Progress, Search, named_quantity
+from topobelief.planning.engine import Engine
+from topobelief.planning.registry import AUTO, BOUNDS, ENGINES, OBJECTIVES, SIGNATURES, chosen
+from topobelief.planning.search import Clock, Progress, Search
 from topobelief.signatures.von_neumann import DENSE_SPECTRUM_SIZE, expected_spectrum_seconds
 
-if TYPE_CHECKING:
-    from topobelief.planning.incremental import IncrementalEvaluation
-
 _INCREMENTAL_WORK = 250_000  # actions times edges of the prior from which increments pay
+_SAMPLE_SIZE = 32  # actions whose bounds tell which family to take
+_OPEN_SHARE = 0.5  # what Fischer's bounds may leave open: they and so many exact values cost as much as chained bounds of all
 
-BoundsName = Literal["paper", "fischer", "anchored", "auto"]
 Proof = Literal["none", "bounded", "optimal"]
 
 
 class Planner:
     """Chooses among actions on one pose graph.
+
+    Threads may share a planner. In pickles and copies it is one that has factored nothing yet.
 
     Parameters
     ----------
@@ -55,12 +58,18 @@ class Planner:
     signature
         What ranks the actions: "spanning_trees", "von_neumann" (dense spectrum) or "von_neumann_approx" (degrees).
     bounds
-        Family of bounds: "fischer" (any noise), "paper" (one block-isotropic Omega) or "anchored" (any noise: exact prior,
-        bounded increment; far tighter, and about as dear as exact values; needs the extra `fast`). "auto": anchored where
-        many actions are evaluated by increments and Fischer's bounds of some of them leave more than half open, else
-        Fischer's; the decision says which.
+        Family of bounds, for any noise but where it says otherwise. "fischer"; "fischer_step": never looser, from scratch;
+        "paper": one block-isotropic Omega; "anchored": exact prior, bounded increment, far tighter, about as expensive as exact
+        values; "chain": anchored, each closure given those before it, tighter still. "auto": chain where many actions are
+        evaluated by increments and Fischer's bounds of some of them leave more than half open, else Fischer's; the decision
+        says which.
     determinant
         "cholesky" or "hadamard" (looser, cheaper), in the lower bound of J.
+    window
+        Closures before each one on which the family "chain" conditions it.
+    engine
+        "scratch": each action alone. "incremental": all at once, by increments to a prior that is factored once (extra `fast`).
+        "auto": by increments where that is worth loading the compiled kernels.
     anchor
         Pose that the bounds hold. Default: the last one, where the robot is.
     normalized
@@ -74,6 +83,11 @@ class Planner:
         For an unknown choice, or a dense spectrum that was not asked for twice.
     DisconnectedGraphError
         Names the poses that the anchor does not reach.
+
+    Warns
+    -----
+    NotOptimizedWarning
+        Where the graph is far from its estimate (chi^2 per degree of freedom above 100).
 
     Examples
     --------
@@ -89,51 +103,54 @@ class Planner:
         self,
         graph: PoseGraph,
         *,
-        objective: ObjectiveName = "joint",
-        signature: SignatureName = "spanning_trees",
-        bounds: BoundsName = "fischer",
+        objective: str = "joint",
+        signature: str = "spanning_trees",
+        bounds: str = "fischer",
         determinant: Determinant = "cholesky",
+        window: int = 2,
+        engine: str = AUTO,
         anchor: int | None = None,
         normalized: bool = False,
         allow_dense_spectrum: bool = False,
     ) -> None:
-        require_choice("objective", objective, get_args(ObjectiveName))
-        require_choice("signature", signature, get_args(SignatureName))
-        require_choice("bounds", bounds, get_args(BoundsName))
-        require_choice("determinant", determinant, get_args(Determinant))
-        self._largest_spectrum = DENSE_SPECTRUM_SIZE if signature == "von_neumann" and not allow_dense_spectrum else math.inf
-        if bounds == "anchored" and not _has_kernels():
+        require_choice("objective", objective, OBJECTIVES)
+        require_choice("signature", signature, SIGNATURES)
+        require_choice("bounds", bounds, (*BOUNDS, AUTO))
+        require_choice("engine", engine, (*ENGINES, AUTO))
+        if engine == "incremental" and not _has_kernels():
             raise InvalidInputError(
-                "bounds=\"anchored\" expects numba to be installed, got none; run pip install 'topobelief[fast]'"
+                "engine=\"incremental\" expects numba to be installed, got none; run pip install 'topobelief[fast]'"
             )
-        self._bounds: BoundsName = bounds
-        self._given_anchor = anchor
-        self._choices = (objective, signature, normalized)
-        self._determinant: Determinant = determinant
-        self._take(graph)
-        self._scratch: ScratchEvaluation | None = None
-        self._incremental: IncrementalEvaluation | None = None
+        self._criteria = Criteria(objective, signature, bounds, BoundOptions(determinant, window), normalized)
+        self._given_anchor, self._given_engine = anchor, engine
+        self._allow_dense_spectrum = allow_dense_spectrum
+        self._engines: dict[str, Engine] = {}
+        self._graph, self._anchor = graph, self._checked(graph)
+        warn_of_misfit(graph)
 
-    def _take(self, graph: PoseGraph) -> None:
-        """Check a prior and plan on it from now on."""
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "_engines": {}}
+
+    def _checked(self, graph: PoseGraph) -> int:
+        """The pose to hold on a graph that can be planned on."""
         anchor = graph.num_poses - 1 if self._given_anchor is None else checked_anchor(graph.num_poses, self._given_anchor)
         graph.topology.require_connected(anchor=anchor, names=graph.ids)
         self._refuse_dense_spectrum(graph.num_poses)
-        if self._bounds == "paper":
-            require_equal_noise(fisher_rows(graph))
-        self._graph, self._anchor = graph, anchor
+        if self._criteria.bounds == "paper":
+            require_equal_noise(graph.information)
+        return anchor
 
     @property
     def graph(self) -> PoseGraph:
         """The prior."""
         return self._graph
 
-    def extend(self, graph: PoseGraph) -> Planner:
-        """Plan on a graph that has grown: the chosen path was driven, or new measurements came in.
+    def extended(self, graph: PoseGraph) -> Planner:
+        """A planner on a graph that has grown: the chosen path was driven, or new measurements came in.
 
-        What the planner factored is taken over where it can be (docs, the mathematics, section 7): orders of elimination, and
+        What this planner factored is taken over where it can be (docs, the mathematics, section 7): orders of elimination, and
         those parts of each factor below which nothing has changed. Topological ones survive a new estimate; those of the
-        information matrix where poses have not moved.
+        information matrix where poses have not moved. This planner stays as it is.
 
         Parameters
         ----------
@@ -141,31 +158,35 @@ class Planner:
             Its first poses and edges are those of the graph as it was, at any poses. Other graphs are valid, and start anew.
             Unless an anchor was given, the new last pose is held.
 
-        Returns
-        -------
-        Planner
-            This one.
-
         Raises
         ------
         InvalidInputError, DisconnectedGraphError, InvalidGraphError
-            As for the planner; it then still plans on the graph as it was.
+            As for the planner.
 
         Examples
         --------
+        >>> from topobelief.graph.action import posterior
         >>> prior = PoseGraph([[0, 0, 0], [1, 0, 0]], [(0, 1)], None, np.eye(3) * 100)
         >>> planner = Planner(prior)
         >>> ahead = Action([[2, 0, 0]], [(1, 2)], np.eye(3) * 100)
-        >>> planner.extend(posterior(prior, ahead)).graph.num_poses
+        >>> planner.extended(posterior(prior, ahead)).graph.num_poses
         3
         """
-        before = self._graph
-        self._take(graph)
-        self._scratch = None
-        if self._incremental is not None:
-            grown = graph.group is before.group and graph.num_poses >= before.num_poses
-            self._incremental = self._incremental.extended(graph, self._anchor) if grown else None
-        return self
+        criteria = self._criteria
+        grown = Planner(
+            graph,
+            objective=criteria.objective,
+            signature=criteria.signature,
+            bounds=criteria.bounds,
+            determinant=criteria.options.determinant,
+            window=criteria.options.window,
+            engine=self._given_engine,
+            anchor=self._given_anchor,
+            normalized=criteria.normalized,
+            allow_dense_spectrum=self._allow_dense_spectrum,
+        )
+        grown._engines = {name: engine.extended(graph, grown._anchor) for name, engine in self._engines.items()}
+        return grown
 
     def decide(
         self,
@@ -213,9 +234,13 @@ class Planner:
         _check_limits(margin, proof, max_evaluations, deadline)
         check_actions(self._graph, actions)
         self._refuse_dense_spectrum(self._graph.num_poses + max(action.num_new_poses for action in actions))
-        if self._bounds == "paper":
+        if self._criteria.bounds == "paper":
             self._require_equal_noise(actions)
-        search = Search(self._evaluation_of(len(actions)), actions, Clock(deadline, on_progress))
+        engine = self._engine_for(len(actions))
+        criteria = self._criteria
+        if criteria.bounds == AUTO:
+            criteria = replace(criteria, bounds=_cheapest_bounds(engine, criteria, actions))
+        search = Search(engine, criteria, actions, Clock(deadline, on_progress))
         together = margin is None and proof != "none" and deadline is None
         search.rank(bounds_too=together)
         if margin is not None:
@@ -244,31 +269,23 @@ class Planner:
             Where double precision cannot give an entropy.
         """
         check_actions(self._graph, actions)
-        clock, evaluation = Clock(None, on_progress), self._evaluation_of(len(actions))
-        values = np.empty(len(actions))
-        for start in range(0, len(actions), evaluation.batch_size):
-            batch = list(range(start, min(start + evaluation.batch_size, len(actions))))
-            values[batch], _ = named_quantity(evaluation.entropies, actions, batch)
-            clock.report("evaluations", batch[-1] + 1, len(actions))
-        return values
+        clock = Clock(None, on_progress)
+        return Search(self._engine_for(len(actions)), self._criteria, actions, clock).entropies_of_all()
 
-    def _evaluation_of(self, num_actions: int) -> Evaluation:
-        """From scratch, or by increments where that is worth the compiled kernels' time to load."""
-        worthwhile = num_actions * self._graph.num_edges >= _INCREMENTAL_WORK and _has_kernels()
-        if not (worthwhile or self._bounds == "anchored"):
-            if self._scratch is None:
-                family = "fischer" if self._bounds == "auto" else self._bounds
-                self._scratch = ScratchEvaluation(self._graph, *self._choices, family, self._determinant, self._anchor)
-            return self._scratch
-        if self._incremental is None:
-            from topobelief.planning.incremental import IncrementalEvaluation  # loads numba
-
-            choices = *self._choices, self._bounds, self._determinant
-            self._incremental = IncrementalEvaluation(self._graph, *choices, self._anchor)
-        return self._incremental.for_one_decision() if self._bounds == "auto" else self._incremental
+    def _engine_for(self, num_actions: int) -> Engine:
+        """The engine that was asked for, or the one that is worth its time."""
+        name = self._given_engine
+        if name == AUTO:
+            large = num_actions * self._graph.num_edges >= _INCREMENTAL_WORK
+            worthwhile = large or _kernels_are_loaded() or self._criteria.bounds in ("anchored", "chain")
+            name = "incremental" if worthwhile and _has_kernels() else "scratch"
+        if name not in self._engines:
+            self._engines[name] = chosen(ENGINES, name)(self._graph, self._anchor)
+        return self._engines[name]
 
     def _refuse_dense_spectrum(self, num_poses: int) -> None:
-        if num_poses > self._largest_spectrum:
+        spectral = self._criteria.signature == "von_neumann" and not self._allow_dense_spectrum
+        if spectral and num_poses > DENSE_SPECTRUM_SIZE:
             raise InvalidInputError(
                 f"the exact von Neumann entropy of {num_poses} poses takes about "
                 f'{expected_spectrum_seconds(num_poses):.0f} s an action; use "von_neumann_approx", '
@@ -281,7 +298,7 @@ class Planner:
         for index, action in enumerate(actions):
             if expected is None:  # a graph without edges
                 try:
-                    require_equal_noise(fisher_rows(posterior(self._graph, action)))
+                    require_equal_noise(action.information)
                 except InvalidGraphError as error:
                     raise InvalidActionError(str(error), action=index, label=action.label) from None
                 continue
@@ -294,6 +311,23 @@ class Planner:
                     edge=int(edge),
                     label=action.label,
                 )
+
+
+def _cheapest_bounds(engine: Engine, criteria: Criteria, actions: Sequence[Action]) -> str:
+    """The family by which a proof is expected to cost least: Fischer's, unless it leaves most of a sample open."""
+    if engine.batch_size == 1:
+        return "fischer"
+    places: list[int] = np.unique(np.linspace(0, len(actions) - 1, _SAMPLE_SIZE).astype(int)).tolist()
+    sample = [actions[place] for place in places]
+    lower, upper = Batch(engine, replace(criteria, bounds="fischer"), sample, places).bounds()
+    costs = np.array([action.cost for action in sample])
+    num_open = np.count_nonzero(lower + costs <= (upper + costs).min()) - 1  # without the best
+    return "fischer" if num_open <= _OPEN_SHARE * (len(sample) - 1) else "chain"
+
+
+def _kernels_are_loaded() -> bool:
+    """Whether this process has paid for loading the compiled kernels."""
+    return "topobelief.linalg.increments" in sys.modules
 
 
 def _has_kernels() -> bool:

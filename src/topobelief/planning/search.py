@@ -11,36 +11,17 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from topobelief.arrays import FloatArray
-from topobelief.errors import IllConditionedError
-from topobelief.graph.action import Action
+from topobelief.arrays import FloatArray, IntArray
+from topobelief.graph.action import Action, driven_lengths
+from topobelief.linalg.estimate import Estimate
+from topobelief.planning.batch import Batch, Criteria
 from topobelief.planning.decision import Candidate, Decision
-from topobelief.planning.evaluation import Evaluation
-
-Quantity = Callable[[Sequence[Action]], tuple[FloatArray, FloatArray]]
+from topobelief.planning.engine import Engine
+from topobelief.planning.ranking import first_alike, ranking_of
 
 Progress = Callable[[str, int, int], None]
-"""Called with a stage ("signatures", "bounds", "evaluations"), how many actions are done, and out of how many."""
-
-
-def named_quantity(quantity: Quantity, actions: Sequence[Action], batch: list[int]) -> tuple[FloatArray, FloatArray]:
-    """A quantity of a batch of actions; an `IllConditionedError` says which action is to blame.
-
-    Raises
-    ------
-    IllConditionedError
-        Names the first action whose quantity double precision cannot give.
-    """
-    try:
-        return quantity([actions[index] for index in batch])
-    except IllConditionedError:
-        for index in batch:
-            try:
-                quantity([actions[index]])
-            except IllConditionedError as error:
-                label = f" ({actions[index].label!r})" if actions[index].label else ""
-                raise IllConditionedError(f"action {index}{label}: {error.what}", error.error_estimate) from None
-        raise
+"""Called with a stage ("signatures", "bounds", "evaluations"), how many actions are done, and out of how many; equal actions
+count once."""
 
 
 class Clock:
@@ -59,6 +40,11 @@ class Clock:
         self._on_progress = on_progress
 
     @property
+    def limited(self) -> bool:
+        """Whether there is a deadline."""
+        return math.isfinite(self._end)
+
+    @property
     def expired(self) -> bool:
         """Whether the deadline has passed."""
         return time.monotonic() >= self._end
@@ -70,37 +56,45 @@ class Clock:
 
 
 class Search:
-    """Fills in signatures, then bounds, then exact values; `decision()` may be taken at any time after `rank`."""
+    """Fills in signatures, then bounds, then exact values; `decision()` may be taken at any time after `rank`.
 
-    def __init__(self, evaluation: Evaluation, actions: Sequence[Action], clock: Clock) -> None:
-        self._evaluation, self._actions, self._clock = evaluation, actions, clock
+    Bounds and exact values, cost excluded, are kept at the first of equal actions, for all of these.
+    """
+
+    def __init__(self, engine: Engine, criteria: Criteria, actions: Sequence[Action], clock: Clock) -> None:
+        self._engine, self._criteria, self._actions, self._clock = engine, criteria, actions, clock
         count = len(actions)
         self._costs = np.array([action.cost for action in actions])
-        self._signatures, self._lower, self._upper, self._entropies = np.full((4, count), np.nan)
+        self._signatures, self._low, self._high, self._values = np.full((4, count), np.nan)
+        self._free = Estimate(*np.full((2, count), np.nan))  # exact values that came with the bounds
+        self._first: IntArray = first_alike(actions)
         self._ranking: list[int] = []
 
     def rank(self, *, bounds_too: bool) -> None:
         """Signatures of all actions and their order; bounds in the same pass if wanted, while what they share is at hand."""
-        rounding = 0.0
-        for batch in self._batches(range(len(self._actions))):
-            self._signatures[batch], errors = self._of(batch, self._evaluation.signatures)
-            rounding = max(rounding, float(errors.max()))
+        different = self._different(range(len(self._actions)))
+        done = 0
+        for places in self._parts(different):
+            batch = self._batch(places)
+            self._signatures[places] = batch.signatures().value
             if bounds_too:
-                self._bound(batch)
-            self._clock.report("signatures", batch[-1] + 1, len(self._actions))
-        in_nats = self._evaluation.signature == "spanning_trees"
-        score = self._signatures - self._costs if in_nats else self._signatures
-        self._ranking = _descending(score, tolerance=2 * rounding)
+                self._bound(places, batch)
+            done += len(places)
+            self._clock.report("signatures", done, len(different))
+        in_nats = self._criteria.signature == "spanning_trees"
+        costs = self._costs if in_nats else np.zeros_like(self._costs)
+        self._signatures = self._signatures[self._first]
+        self._ranking = ranking_of(self._signatures, costs).tolist()
 
     def bound_all(self) -> None:
         """Bounds of all actions, along the ranking, until the deadline."""
-        done = 0
-        for batch in self._batches(self._ranking):
+        different, done = self._different(self._ranking), 0
+        for places in self._parts(different):
             if self._clock.expired:
                 return
-            self._bound(batch)
-            done += len(batch)
-            self._clock.report("bounds", done, len(self._actions))
+            self._bound(places, self._batch(places))
+            done += len(places)
+            self._clock.report("bounds", done, len(different))
 
     def prove(self, max_evaluations: int) -> None:
         """Exact values along the ranking, skipping what a lower bound rules out, in batches that double."""
@@ -108,29 +102,44 @@ class Search:
             return
         evaluated, size = 0, 1
         while evaluated < max_evaluations and not self._clock.expired:
-            left = [index for index in self._ranking if math.isnan(self._entropies[index])]
+            entropies, lower = self._entropies, self._lower
+            left = [index for index in self._ranking if math.isnan(entropies[index])]
             if evaluated:
                 threshold = self._upper[self._best()]
-                left = [index for index in left if not self._lower[index] > threshold]
-            batch = left[: min(size, max_evaluations - evaluated)]
-            if not batch:
+                left = [index for index in left if not lower[index] > threshold]
+            left = self._different(left)
+            places = left[: min(size, max_evaluations - evaluated)]
+            if not places:
                 return
-            self._entropies[batch], errors = self._of(batch, self._evaluation.entropies)
-            self._set_bounds(batch, self._entropies[batch] - errors, self._entropies[batch] + errors)
-            evaluated += len(batch)
-            size = min(2 * size, self._evaluation.batch_size)
-            self._clock.report("evaluations", evaluated, evaluated + len(left) - len(batch))
+            exact = self._exact(places)
+            self._values[places] = exact.value
+            self._low[places], self._high[places] = exact.value - exact.error, exact.value + exact.error
+            evaluated += len(places)
+            size = min(2 * size, self._engine.batch_size)
+            self._clock.report("evaluations", evaluated, evaluated + len(left) - len(places))
+
+    def entropies_of_all(self) -> FloatArray:
+        """Exact values of all actions, cost excluded, shape (K,)."""
+        different, done = self._different(range(len(self._actions))), 0
+        for places in self._parts(different):
+            self._values[places] = self._batch(places).entropies().value
+            done += len(places)
+            self._clock.report("evaluations", done, len(different))
+        return self._entropies
 
     def decision_with_margin(self, margin: float) -> Decision:
         """Algorithm 1's first branch: the upper bound of the first of the ranking, and no other."""
         first = self._ranking[0]
-        self._bound([first])
-        self._lower[first] = np.nan
-        met = bool(self._upper[first] < margin)
+        stands_for_it = [int(self._first[first])]
+        self._bound(stands_for_it, self._batch(stands_for_it))
+        unknown = np.full(len(self._actions), np.nan)
+        upper = np.where(np.arange(len(self._actions)) == first, self._upper, np.nan)
+        met = bool(upper[first] < margin)
         alone = len(self._actions) == 1
         return self._decision(
-            best=first,
-            survivors=[first] if met else self._ranking,
+            first,
+            [first] if met else self._ranking,
+            (unknown, upper),
             error_bound=0.0 if alone else math.inf,
             proven=alone,
             margin_met=met,
@@ -139,32 +148,56 @@ class Search:
     def decision(self) -> Decision:
         """What is known so far, with its certificate."""
         best, survivors = self._best(), self._survivors()
+        entropies, lower, upper = self._entropies, self._lower, self._upper
         others = [index for index in self._ranking if index != best]
-        unknown = [index for index in others if math.isnan(self._lower[index])]
+        unknown = [index for index in others if math.isnan(lower[index])]
         if not others:
             error_bound = 0.0
-        elif unknown or math.isnan(self._upper[best]):
+        elif unknown or math.isnan(upper[best]):
             error_bound = math.inf
         else:
-            error_bound = max(0.0, float(self._upper[best] - np.min(self._lower[others])))
-        open_actions = [index for index in survivors if index != best and math.isnan(self._entropies[index])]
-        evaluated_best = not math.isnan(self._entropies[best])
+            error_bound = max(0.0, float(upper[best] - np.min(lower[others])))
+        open_actions = [index for index in survivors if index != best and math.isnan(entropies[index])]
+        evaluated_best = not math.isnan(entropies[best])
         proven = not open_actions and (evaluated_best or survivors == [best])
-        return self._decision(best, survivors, error_bound, proven, margin_met=None)
+        return self._decision(best, survivors, (lower, upper), error_bound=error_bound, proven=proven, margin_met=None)
 
-    def _batches(self, indices: Sequence[int]) -> Iterator[list[int]]:
-        size = self._evaluation.batch_size
-        for start in range(0, len(indices), size):
-            yield list(indices[start : start + size])
+    @property
+    def _lower(self) -> FloatArray:
+        """LB of all actions, cost included; nan where unknown."""
+        return self._low[self._first] + self._costs
 
-    def _bound(self, batch: list[int]) -> None:
-        self._set_bounds(batch, *self._of(batch, self._evaluation.bounds))
+    @property
+    def _upper(self) -> FloatArray:
+        """UB of all actions, cost included; nan where unknown."""
+        return self._high[self._first] + self._costs
 
-    def _set_bounds(self, batch: list[int], lower: FloatArray, upper: FloatArray) -> None:
-        self._lower[batch], self._upper[batch] = lower + self._costs[batch], upper + self._costs[batch]
+    @property
+    def _entropies(self) -> FloatArray:
+        """Exact values of all actions, cost excluded; nan where unknown."""
+        return self._values[self._first]
 
-    def _of(self, batch: list[int], quantity: Quantity) -> tuple[FloatArray, FloatArray]:
-        return named_quantity(quantity, self._actions, batch)
+    def _different(self, indices: Sequence[int]) -> list[int]:
+        """Actions that stand for these and their equals, each once, in the order of their first mention."""
+        return list(dict.fromkeys(self._first[indices].tolist()))
+
+    def _parts(self, places: Sequence[int]) -> Iterator[list[int]]:
+        size = self._engine.batch_size
+        for start in range(0, len(places), size):
+            yield list(places[start : start + size])
+
+    def _batch(self, places: list[int]) -> Batch:
+        return Batch(self._engine, self._criteria, [self._actions[place] for place in places], places)
+
+    def _bound(self, places: list[int], batch: Batch) -> None:
+        self._low[places], self._high[places] = batch.bounds()
+        if batch.knows_entropies:
+            exact = batch.entropies()
+            self._free.value[places], self._free.error[places] = exact.value, exact.error
+
+    def _exact(self, places: list[int]) -> Estimate[FloatArray]:
+        free = Estimate(self._free.value[places], self._free.error[places])
+        return free if np.isfinite(free.value).all() else self._batch(places).entropies()
 
     def _best(self) -> int:
         """U^, or the least value once evaluated; the earlier in the ranking where values tie."""
@@ -177,42 +210,35 @@ class Search:
         kept = ~(self._lower > threshold)  # unknown bounds rule nothing out
         return [index for position, index in enumerate(self._ranking) if position == 0 or kept[index]]
 
-    def _decision(self, best: int, survivors: list[int], error_bound: float, proven: bool, margin_met: bool | None) -> Decision:
-        session = self._evaluation
+    def _decision(
+        self,
+        best: int,
+        survivors: list[int],
+        bounds: tuple[FloatArray, FloatArray],
+        *,
+        error_bound: float,
+        proven: bool,
+        margin_met: bool | None,
+    ) -> Decision:
+        criteria = self._criteria
         return Decision(
             best=best,
             ranking=np.array(self._ranking),
             signatures=self._signatures,
-            lower=self._lower,
-            upper=self._upper,
+            lower=bounds[0],
+            upper=bounds[1],
             entropies=self._entropies,
             survivors=np.array(survivors),
             error_bound=error_bound,
             margin_met=margin_met,
-            num_evaluations=int(np.count_nonzero(~np.isnan(self._entropies))),
+            num_evaluations=int(np.count_nonzero(~np.isnan(self._values))),
             proven_optimal=proven,
             candidates=tuple(
                 Candidate(action.label, action.num_new_poses, action.num_closures, length, action.cost)
-                for action, length in zip(self._actions, self._lengths(), strict=True)
+                for action, length in zip(self._actions, driven_lengths(self._engine.graph, self._actions), strict=True)
             ),
-            objective=session.objective,
-            signature=session.signature,
-            bounds=session.family,
-            determinant=session.determinant,
+            objective=criteria.objective,
+            signature=criteria.signature,
+            bounds=criteria.bounds,
+            determinant=criteria.options.determinant,
         )
-
-    def _lengths(self) -> list[float]:
-        """Of the paths along each action's new poses, from the graph's last one on."""
-        graph, num_new = self._evaluation.graph, [action.num_new_poses for action in self._actions]
-        k, which = graph.group.position_dim, np.repeat(np.arange(len(num_new)), num_new)
-        path = np.concatenate([np.zeros((0, k)), *(action.poses[:, :k] for action in self._actions if action.num_new_poses)])
-        before = np.roll(path, 1, axis=0)
-        before[np.diff(which, prepend=-1) > 0] = graph.positions[-1]
-        return np.bincount(which, weights=np.linalg.norm(path - before, axis=1), minlength=len(num_new)).tolist()
-
-
-def _descending(scores: FloatArray, *, tolerance: float) -> list[int]:
-    """Indices by descending score; runs of scores that rounding cannot tell apart are ties, ordered by index."""
-    order = np.argsort(-scores, kind="stable")
-    runs = np.cumsum(np.diff(scores[order], prepend=scores[order[:1]]) < -tolerance)
-    return [int(index) for index in order[np.lexsort((order, runs))]]

@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from topobelief.arrays import FloatArray
+from topobelief.candidates.start import Start, find_start
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.decision import Decision
@@ -73,13 +74,14 @@ def draw_paths(
     decision: Decision,
     *,
     goal: ArrayLike,
+    start: int | ArrayLike | Start | None = None,
 ) -> Figure:
     """Candidates over the map, the best one marked, with the prior graph beneath.
 
     Parameters
     ----------
     graph
-        The prior, in SE(2); the paths start at its last pose.
+        The prior, in SE(2).
     world
         Where the robot may be.
     paths
@@ -90,15 +92,17 @@ def draw_paths(
         On these actions.
     goal : shape (2,)
         Metres.
+    start
+        As given to `predict_actions`. Default: the last pose.
 
     Returns
     -------
     Figure
         `topobelief.report.canvas.save_figure` writes it.
     """
-    start, end = graph.positions[-1], np.asarray(goal, dtype=np.float64)
-    closures = _predicted_closures(graph, actions[decision.best])
-    seen = np.concatenate([start[None], end[None], *paths, closures.reshape(-1, 2)])
+    begin, end = find_start(graph, start, world=world), np.asarray(goal, dtype=np.float64)
+    closures = _predicted_closures(graph, begin, actions[decision.best])
+    seen = np.concatenate([begin.place[None], end[None], *paths, closures.reshape(-1, 2)])
     everything = np.concatenate([np.reshape(world.free.bounds, (2, 2)), graph.positions, seen])
     view, whole = _View.around(seen, padding=0.07), _View.around(everything, padding=0.02)
     part = max(near / far for near, far in zip(view.size, whole.size, strict=True))
@@ -114,7 +118,7 @@ def draw_paths(
         key = _draw_world(panel, world, view)
         key += _draw_graph(panel, graph, view)
         key += _draw_candidates(panel, paths, closures, decision)
-        key += _draw_ends(panel, start, end)
+        key += _draw_ends(panel, graph, begin, end)
         view.shown_on(panel)
         panel.map_axes()
         canvas.title(_LEFT, _BOTTOM + height + 0.10, _title(decision), _subtitle(decision))
@@ -178,10 +182,12 @@ def _draw_candidates(panel: Panel, paths: Sequence[FloatArray], closures: FloatA
     return key
 
 
-def _draw_ends(panel: Panel, start: FloatArray, goal: FloatArray) -> list[Entry]:
+def _draw_ends(panel: Panel, graph: PoseGraph, start: Start, goal: FloatArray) -> list[Entry]:
+    at_pose = "the graph's last pose" if start.pose == graph.num_poses - 1 else f"pose {graph.ids[start.pose]}"
+    name = f"start, {f'near {at_pose}' if start.distance(graph) else at_pose}"
     key: list[Entry] = []
     for label, place, marker, colour, size in (
-        ("start, the graph's last pose", start, "o", "white", 6.0),
+        (name, start.place, "o", "white", 6.0),
         ("goal", goal, "*", style.GOAL, 12.0),
     ):
         look: dict[str, Any] = {"marker": marker, "markerfacecolor": colour, "markeredgecolor": style.INK, "markersize": size}
@@ -200,15 +206,20 @@ def _draw_overview(panel: Panel, world: World, graph: PoseGraph, best: FloatArra
     panel.no_ticks()
 
 
-def _predicted_closures(graph: PoseGraph, action: Action) -> FloatArray:
+def _predicted_closures(graph: PoseGraph, start: Start, action: Action) -> FloatArray:
     """Segments of the action's edges other than its odometry, shape (closures, 2, 2)."""
     positions = np.concatenate([graph.positions, graph.group.position(action.poses)])
-    return positions[action.edges[np.abs(action.edges[:, 0] - action.edges[:, 1]) > 1]]
+    low, high = np.sort(action.edges, axis=1).T
+    first = (low == start.pose) & (high == graph.num_poses)
+    between_new = (low >= graph.num_poses) & (high - low == 1)
+    return positions[action.edges[~(first | between_new)]]
 
 
 def _title(decision: Decision) -> str:
-    noun = "path" if decision.num_actions == 1 else "paths"
-    return f"{decision.num_actions} candidate {noun} on the pose graph; {style.short_name(decision, decision.best)} is chosen"
+    name = style.short_name(decision, decision.best)
+    if decision.num_actions == 1:
+        return f"{name} on the pose graph, the only candidate"
+    return f"{decision.num_actions} candidate paths on the pose graph; {name} is chosen"
 
 
 def _subtitle(decision: Decision) -> str:

@@ -17,7 +17,7 @@ from topobelief.report import style
 from topobelief.report.canvas import Canvas, Entry, Panel
 from topobelief.report.study_figures import STRATEGY_NAMES
 from topobelief.simulation.comparison import ComparedRun, summarised
-from topobelief.simulation.metrics import aligned, chained, position_covariances, position_errors
+from topobelief.simulation.metrics import chained, from_start, position_covariances
 from topobelief.simulation.record import Deliberation, Record
 from topobelief.world import World
 
@@ -43,15 +43,15 @@ class _Track:
 def draw_run(record: Record) -> Figure:
     """The map with the true, estimated and dead-reckoned tracks, and their errors along the way.
 
-    Tracks are laid on the true one by the alignment that their errors are measured after; the ellipses hold a position of the
-    estimate with 95 %, the first pose held, if the graph's noise is what it says.
+    Tracks begin at the true start, which is known, and so errors begin at 0; the ellipses hold a position of the estimate with
+    95 %, the first pose held, if the graph's noise is what it says.
     """
     truth = record.truth
     tracks = [_Track("wheel odometry", record.history.key_poses.wheel_odometry, _WHEELS, (0, (4, 2)))]
     if record.options.noise is not None:
         tracks.append(_Track("odometry of the graph alone", chained(record.graph), _DISTURBED, (0, (1, 1.4))))
     tracks.append(_Track("estimate", record.graph.poses, _ESTIMATE, "-"))
-    shown = [aligned(track.poses, truth) for track in tracks]
+    shown = [from_start(track.poses, truth) for track in tracks]
     x_min, y_min, x_max, y_max = _extent([truth, *shown], record.scenario.world)
     aspect = (y_max - y_min) / (x_max - x_min)
     width = math.sqrt(_MAP_AREA / aspect)
@@ -73,7 +73,7 @@ def draw_run(record: Record) -> Figure:
         panel.map_axes()
         canvas.title(_LEFT, below + height + 0.10, _title(record), _subtitle(record))
         canvas.key(key, _LEFT + width + _GAP, below + height, corner="upper left")
-        _draw_errors(canvas.panel(_LEFT, _BOTTOM, width, _ERRORS_HEIGHT), tracks, record)
+        _draw_errors(canvas.panel(_LEFT, _BOTTOM, width, _ERRORS_HEIGHT), tracks, shown, record)
     return canvas.figure
 
 
@@ -219,12 +219,12 @@ def _draw_goals(panel: Panel, record: Record) -> list[Entry]:
     return key
 
 
-def _draw_errors(panel: Panel, tracks: Sequence[_Track], record: Record) -> None:
-    """Position errors over the metres driven."""
+def _draw_errors(panel: Panel, tracks: Sequence[_Track], shown: Sequence[FloatArray], record: Record) -> None:
+    """Distance of each track from the true one over the metres driven."""
     driven = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(record.truth[:, :2], axis=0), axis=1))]
     largest = 0.0
-    for track in tracks:
-        errors = position_errors(track.poses, record.truth)
+    for track, poses in zip(tracks, shown, strict=True):
+        errors = np.linalg.norm(poses[:, :2] - record.truth[:, :2], axis=1)
         largest = max(largest, float(errors.max()))
         panel.line(np.column_stack([driven, errors]), color=track.colour, linestyle=track.dashes, linewidth=1.2)
     for leg in record.legs:
@@ -270,7 +270,7 @@ def _subtitle(record: Record) -> str:
     goals = len(record.scenario.goals)
     return (
         f"{record.num_goals_reached} of {goals} goal{'s' if goals > 1 else ''} reached, "
-        f"{sum(leg.distance for leg in record.legs):.0f} m, {record.graph.num_poses} key poses; tracks laid on the true one"
+        f"{sum(leg.distance for leg in record.legs):.0f} m, {record.graph.num_poses} key poses; tracks begin at the true start"
     )
 
 

@@ -18,10 +18,12 @@ from topobelief.simulation.record import Leg, Record
 def leg_line(leg: Leg) -> str:
     """What was chosen on the way to a goal, and what came of it."""
     head = f"goal {leg.goal}" if leg.goal else "approach"
-    chosen = f"path {leg.chosen + 1} of {leg.num_candidates} ({leg.planned:.1f} m); " if leg.num_candidates else ""
+    chosen = f"path {leg.chosen} of {leg.num_candidates} ({leg.planned:.1f} m); " if leg.num_candidates else ""
     driven = ""
     if leg.driven_seconds:
         driven = f" after {leg.distance:.1f} m in {leg.driven_seconds:.0f} s with {leg.num_closures} loop closures"
+    if not math.isnan(leg.goal_distance):
+        driven += f", {leg.goal_distance:.2f} m from the goal ({leg.believed_goal_distance:.2f} m as the robot believes)"
     return f"{head}: {chosen}{leg.outcome}{driven}"
 
 
@@ -29,13 +31,16 @@ def metrics_table(record: Record) -> Table:
     """Errors, entropies and times of a run."""
     values = run_metrics(record)
     rows = [
-        ("goals reached", f"{values['goals_reached']:.0f} of {values['goals']:.0f}"),
+        ("goals reached in truth", f"{values['goals_reached']:.0f} of {values['goals']:.0f}"),
         ("graph", f"{values['poses']:.0f} key poses, {values['closures']:.0f} loop closures"),
         (
             "driven",
             f"{values['distance']:.1f} m in {values['driven_seconds']:.0f} s (simulated), {values['contacts']:.0f} contacts",
         ),
     ]
+    if not math.isnan(values["goal_distance"]):
+        true, believed = values["goal_distance"], values["believed_goal_distance"]
+        rows.append(("distance from the goals", f"at most {true:.2f} m, as the robot believes {believed:.2f} m"))
     for label, name in (
         ("trajectory error", "slam"),
         ("  odometry of the graph alone", "odometry_factors"),

@@ -25,7 +25,8 @@ def candidate_table(decision: Decision) -> Table:
         padding=(0, 1),
         collapse_padding=True,
         pad_edge=False,
-        caption=f"lower, upper: bounds of the {decision.objective} entropy in {unit}; the less, the better",
+        caption=f"lower, upper: bounds of the {decision.objective} entropy in {unit}; the less, the better.\n"
+        "Paths are numbered from 0.",
         caption_justify="left",
     )
     columns = ["signature", "lower", "upper"]

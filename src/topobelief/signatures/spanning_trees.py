@@ -14,10 +14,13 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from topobelief.arrays import FloatArray
-from topobelief.graph.information import checked_information, scalar_weights, shared_information, tangent_split
+from topobelief.forms.of_topology import TopologyForms
+from topobelief.forms.protocol import Part, TreeForms
+from topobelief.graph.information import checked_information, tangent_split
 from topobelief.graph.topology import Topology, checked_weights
-from topobelief.linalg import LogDet, LogDetSolver, laplacian_form
+from topobelief.linalg import LogDetSolver, laplacian_form
+from topobelief.linalg.estimate import LOG_2_PI_E, Estimate, Number
+from topobelief.signatures.options import SignatureOptions
 
 
 def log_num_spanning_trees(topology: Topology, *, weights: ArrayLike | None = None) -> float:
@@ -53,7 +56,7 @@ def log_num_spanning_trees(topology: Topology, *, weights: ArrayLike | None = No
     topology.require_connected()
     solver = LogDetSolver(topology.edges, topology.num_nodes, 0)
     tau = solver.log_det(laplacian_form(topology.edges, checked_weights(topology, weights)))
-    return tau.require_accuracy("number of spanning trees").value
+    return tau.known("number of spanning trees").value
 
 
 def spanning_tree_signature(topology: Topology, information: ArrayLike) -> float:
@@ -84,34 +87,33 @@ def spanning_tree_signature(topology: Topology, information: ArrayLike) -> float
     tangent_dim = int(array.shape[-1]) if array.ndim else 0
     tangent_split(tangent_dim)
     checked = checked_information(array, num_edges=topology.num_edges, tangent_dim=tangent_dim)
-    return spanning_tree_estimate(topology, checked, LogDetSolver(topology.edges, topology.num_nodes, 0)).value
+    return joint_signature(TopologyForms(topology, checked)).known("s_ST").value
 
 
-def spanning_tree_estimate(topology: Topology, information: FloatArray, solver: LogDetSolver) -> LogDet:
-    """`spanning_tree_signature` of checked input with its rounding error; the solver holds any one node."""
-    constant = (topology.num_nodes - 1) * information.shape[-1] / 2 * math.log(2 * math.pi * math.e)
-    return (0.5 * weighted_trees(topology, information, solver)).plus(-constant).require_accuracy("s_ST")
+def spanning_trees(forms: TreeForms[Number], options: SignatureOptions) -> Estimate[Number]:
+    """s_ST or s_map, whichever belongs to the objective."""
+    return options.trees(forms).known("s_ST")
 
 
-def map_signature_estimate(
-    topology: Topology, information: FloatArray, solver: LogDetSolver, new_solver: LogDetSolver
-) -> LogDet:
-    """s_map: trees of the whole graph over those of its new part, the existing nodes contracted to one; with its error.
+def joint_signature(forms: TreeForms[Number]) -> Estimate[Number]:
+    """s_ST of all poses: minus the upper bound of their entropy."""
+    return (0.5 * weighted_trees(forms)).plus(-(forms.tangent_dim / 2 * LOG_2_PI_E) * forms.num_free)
 
-    s_map = 1/2 [k (tau_p - ln det L_p,nn) + q (tau_r - ln det L_r,nn)]: the signature of what the existing nodes gain (docs,
-    the mathematics, section 11). `solver` holds any one node, `new_solver` all that exist.
+
+def map_signature(forms: TreeForms[Number]) -> Estimate[Number]:
+    """s_map: trees of the whole graph over those of its new part, the existing nodes contracted to one.
+
+    1/2 [k (tau_p - ln det L_p,nn) + q (tau_r - ln det L_r,nn)]: the signature of what the existing nodes gain (docs, the
+    mathematics, section 11).
     """
-    whole = weighted_trees(topology, information, solver)
-    return (0.5 * (whole - weighted_trees(topology, information, new_solver))).require_accuracy("s_map")
+    return 0.5 * (weighted_trees(forms) - weighted_trees(forms, "new"))
 
 
-def weighted_trees(topology: Topology, information: FloatArray, solver: LogDetSolver) -> LogDet:
-    """k tau_p + q tau_r, without the nodes that the solver holds."""
-    tangent_dim = int(information.shape[-1])
-    k, q = tangent_split(tangent_dim)
-    if shared_information(information) is not None:
-        tau = solver.log_det(laplacian_form(topology.edges, np.ones(topology.num_edges)))
-        return (float(tangent_dim) * tau).plus(solver.num_free * float(np.linalg.slogdet(information[0])[1]))
-    w_p, w_r = scalar_weights(information)
-    tau_p = solver.log_det(laplacian_form(topology.edges, w_p))
-    return float(k) * tau_p + float(q) * solver.log_det(laplacian_form(topology.edges, w_r))
+def weighted_trees(forms: TreeForms[Number], part: Part = "all") -> Estimate[Number]:
+    """k tau_p + q tau_r; one Laplacian serves both where w_r / w_p is constant."""
+    k, q = forms.split
+    positions, ratio = forms.log_det("trees_p", part=part), forms.weight_ratio
+    if ratio is None:
+        return float(k) * positions + float(q) * forms.log_det("trees_r", part=part)
+    num_nodes = forms.num_new if part == "new" else forms.num_free
+    return (float(k + q) * positions).plus(q * math.log(ratio) * num_nodes)

@@ -17,8 +17,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from topobelief.arrays import FloatArray
+from topobelief.forms.of_topology import TopologyForms
+from topobelief.forms.protocol import TreeForms
 from topobelief.graph.information import checked_information, tangent_split
 from topobelief.graph.topology import Topology
+from topobelief.linalg.estimate import LOG_2_PI_E, UNIT_ROUNDOFF, Estimate, Number
+from topobelief.signatures.options import SignatureOptions
 
 DENSE_SPECTRUM_SIZE = 3000
 """Nodes above which a dense spectrum is announced (here) or refused (in the planner)."""
@@ -102,19 +106,36 @@ def von_neumann_entropy_approx(topology: Topology, *, information: ArrayLike | N
     >>> round(von_neumann_entropy_approx(Topology(2, [(0, 1)])), 12)  # ln 2 - 1/2
     0.19314718056
     """
-    simple = topology.simple()
-    i, j = simple.edges.T
-    d = simple.degrees.astype(float)
-    value = topology.num_nodes / 2 * math.log(2) - 0.5 * float(np.sum(1 / (d[i] * d[j])))
-    return value if information is None else value + noise_normalization(topology, information)
+    forms = TopologyForms(topology, _checked(topology, information))
+    return by_degrees(forms, normalized=information is not None).value
 
 
-def noise_normalization(topology: Topology, information: ArrayLike) -> float:
-    """(n - 1)/2 [ln |Omega| - kappa ln(2 pi e)], the term that makes graphs of different sizes comparable."""
-    array = np.asarray(information)
+def von_neumann(forms: TreeForms[Number], options: SignatureOptions) -> Estimate[Number]:
+    """s_VN."""
+    return _rounded(forms.of_topology(von_neumann_entropy), forms)
+
+
+def von_neumann_approx(forms: TreeForms[Number], options: SignatureOptions) -> Estimate[Number]:
+    """s_VN by degrees, normalised where the options say so."""
+    return by_degrees(forms, normalized=options.normalized)
+
+
+def by_degrees(forms: TreeForms[Number], *, normalized: bool) -> Estimate[Number]:
+    """s_VN by degrees; normalised, (n - 1)/2 [mean of ln |Omega| - kappa ln(2 pi e)] is added, as for s_ST."""
+    value = math.log(2) / 2 * (forms.num_free + 1.0) - 0.5 * forms.degree_sum()
+    if normalized:
+        value = value + forms.num_free / 2 * (forms.mean_log_noise() - forms.tangent_dim * LOG_2_PI_E)
+    return _rounded(value, forms)
+
+
+def _rounded(value: Number, forms: TreeForms[Number]) -> Estimate[Number]:
+    """A sum of about as many terms of one sign as there are nodes, with its rounding error."""
+    return Estimate(value, UNIT_ROUNDOFF * (forms.num_free + 1.0) * (1.0 + abs(value)))
+
+
+def _checked(topology: Topology, information: ArrayLike | None) -> FloatArray:
+    """Information matrices of all edges; any where none are given."""
+    array = np.eye(3) if information is None else np.asarray(information)
     tangent_dim = int(array.shape[-1]) if array.ndim else 0
     tangent_split(tangent_dim)
-    checked = checked_information(array, num_edges=topology.num_edges, tangent_dim=tangent_dim)
-    log_dets: FloatArray = np.linalg.slogdet(checked)[1]
-    mean_log_det = float(log_dets.mean()) if topology.num_edges else 0.0
-    return (topology.num_nodes - 1) / 2 * (mean_log_det - tangent_dim * math.log(2 * math.pi * math.e))
+    return checked_information(array, num_edges=topology.num_edges, tangent_dim=tangent_dim)

@@ -63,7 +63,7 @@ class BackEnd:
         return np.array(self._kept, dtype=np.bool_)
 
     @property
-    def last_covariance(self) -> FloatArray:
+    def newest_covariance(self) -> FloatArray:
         """Of the newest pose, in its own frame, shape (3, 3)."""
         return np.asarray(self._isam.marginalCovariance(len(self._poses) - 1), dtype=np.float64)
 

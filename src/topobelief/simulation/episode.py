@@ -1,7 +1,7 @@
 """Active SLAM in closed loop: at each goal the planner gets the graph and the map, decides, and the robot drives.
 
-Everything on the way from the sensors to the wheels reads wheel odometry and scans alone; the true pose goes into the record
-and nowhere else.
+Everything on the way from the sensors to the wheels reads wheel odometry, scans and a bumper alone; the true pose goes into the
+record and nowhere else. A leg ends when the robot believes itself at its goal, and counts as reached where it truly is there.
 """
 
 from __future__ import annotations
@@ -20,10 +20,21 @@ from topobelief.errors import PlanningError
 from topobelief.geometry import SE2_GROUP
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.planning.objectives import ObjectiveName
 from topobelief.planning.planner import Planner
 from topobelief.simulation.path_following import PathFollower
-from topobelief.simulation.record import ARRIVED, INTERRUPTED, Deliberation, History, KeyPoses, Leg, Record, RunOptions
+from topobelief.simulation.record import (
+    ARRIVAL_TOLERANCE,
+    ARRIVED,
+    CONTACT,
+    INTERRUPTED,
+    MISSED,
+    Deliberation,
+    History,
+    KeyPoses,
+    Leg,
+    Record,
+    RunOptions,
+)
 from topobelief.simulation.robot import Robot
 from topobelief.simulation.scan import Scan
 from topobelief.simulation.scenario import Goal, Scenario
@@ -76,6 +87,7 @@ class Episode:
         self._times: list[float] = []
         self._truth: list[FloatArray] = []
         self._wheel: list[FloatArray] = []
+        self._motions: list[FloatArray] = []
         self._track: list[FloatArray] = []
         self._wheel_at_start, self._time_at_start = start, 0.0
         if history is not None:
@@ -100,13 +112,14 @@ class Episode:
     def _replay(self, history: History) -> None:
         """What an earlier run sensed and concluded."""
         key_poses, legs = history.key_poses, history.legs
-        settled = {leg.last_pose for leg in legs if leg.arrived}
+        settled = {leg.last_pose for leg in legs if leg.believed_arrived}
         for index in range(len(key_poses)):
-            self._slam.add_key_pose(key_poses.wheel_odometry[index], key_poses.scans[index])
+            self._slam.add_key_pose(key_poses.wheel_odometry[index], key_poses.scans[index], motion=key_poses.motions[index])
             if index in settled:
                 self._slam.settle()
         self._times = key_poses.times.tolist()
         self._truth, self._wheel = list(key_poses.truth), list(key_poses.wheel_odometry)
+        self._motions = list(key_poses.motions)
         self._legs, self._track = list(legs), list(history.track)
         self._wheel_at_start, self._time_at_start = self._wheel[-1], self._times[-1]
 
@@ -132,20 +145,22 @@ class Episode:
         """
         goals = list(enumerate(self._scenario.goals, start=1))[:last_goal]
         self._should_stop, self._on_progress = should_stop, on_progress
-        if self._scenario.approach and not self._has_reached(0) and not self._attempt(0, None, on_leg):
+        if self._scenario.approach and not self._believes_reached(0) and not self._attempt(0, None, on_leg):
             return self.record()
         for number, goal in goals:
-            if not self._has_reached(number) and not self._attempt(number, goal, on_leg):
+            if not self._believes_reached(number) and not self._attempt(number, goal, on_leg):
                 break
         return self.record()
 
     def record(self) -> Record:
         """The run as far as it went."""
-        last = self._legs[-1].outcome if self._legs else INTERRUPTED
+        outcomes = {leg.goal: leg.outcome for leg in self._legs}  # of the last leg to each goal
+        failed = [outcome for outcome in outcomes.values() if outcome != ARRIVED]
         key_poses = KeyPoses(
             times=np.array(self._times),
             truth=np.array(self._truth),
             wheel_odometry=np.array(self._wheel),
+            motions=np.array(self._motions),
             scans=tuple(self._slam.scans),
         )
         return Record(
@@ -157,20 +172,20 @@ class Episode:
             registered=self._slam.registered,
             occupancy=self._slam.occupancy(),
             deliberations=tuple(self._deliberations),
-            outcome=last,
+            outcome=failed[-1] if failed else ARRIVED if outcomes else INTERRUPTED,
         )
 
-    def _has_reached(self, goal: int) -> bool:
-        return any(leg.goal == goal and leg.arrived for leg in self._legs)
+    def _believes_reached(self, goal: int) -> bool:
+        return any(leg.goal == goal and leg.believed_arrived for leg in self._legs)
 
     def _attempt(self, number: int, goal: Goal | None, on_leg: Callable[[Record], None]) -> bool:
-        """Legs to one goal until it is reached, or there is a reason to stop."""
+        """Legs to one goal until the robot believes itself there, or there is a reason to stop."""
         stuck = 0
         for _ in range(_MAX_ATTEMPTS):
             leg = self._approach() if goal is None else self._session(number, goal)
             self._legs.append(leg)
             on_leg(self.record())
-            if leg.arrived:
+            if leg.believed_arrived:
                 return True
             stuck += leg.outcome.startswith("stuck")
             if stuck == _MAX_STUCK or not leg.outcome.startswith(("stuck", "blocked")):
@@ -199,7 +214,15 @@ class Episode:
         """Candidates, the choice among them, and what all of them would have been worth."""
         begin, options, belief = time.perf_counter(), self._options, self._slam.belief
         world = self._known_world()
-        paths = candidate_paths(world, belief.poses[-1], goal, self._scenario.rule, seed=options.seed)
+        paths = candidate_paths(
+            world,
+            belief.poses[-1],
+            goal,
+            self._scenario.rule,
+            chassis=self._scenario.robot.radius,
+            position_error=self._slam.position_error,
+            seed=options.seed,
+        )
         settings = self._slam.settings
         actions = predict_actions(
             belief,
@@ -236,14 +259,20 @@ class Episode:
         """The leg once its path was followed, to the end or not."""
         begin, contacts, closures = self._robot.time, self._robot.contacts, self._slam.num_closures
         outcome, distance = self._follow(path, f"goal {leg.goal}" if leg.goal else "approach")
+        true, believed = (
+            math.dist(pose[:2].tolist(), path[-1].tolist())
+            for pose in (self._robot.true_pose, self._slam.pose_now(self._wheel_now()))
+        )
+        if outcome == ARRIVED and true > ARRIVAL_TOLERANCE:
+            outcome = f"{MISSED}: {true:.2f} m from the goal, where the robot believed itself within {believed:.2f} m of it"
+        leg = replace(leg, outcome=outcome, goal_distance=true, believed_goal_distance=believed)
         if outcome != INTERRUPTED:
             self._add_key_pose()
-        if outcome == ARRIVED:
+        if leg.believed_arrived:
             self._slam.settle()
         objective = self._options.objective
         return replace(
             leg,
-            outcome=outcome,
             last_pose=self._slam.num_poses - 1,
             distance=distance,
             num_closures=self._slam.num_closures - closures,
@@ -260,6 +289,8 @@ class Episode:
             if self._should_stop():
                 return INTERRUPTED, distance
             wheel = self._wheel_now()
+            if slam.wants_scan(wheel):
+                slam.track(wheel, robot.scan())
             if slam.wants_key_pose(wheel):
                 self._add_key_pose()
                 self._on_progress(name, distance, max(length, distance))
@@ -276,9 +307,13 @@ class Episode:
                 return ARRIVED, distance
             if follower.stuck is not None:
                 return f"stuck: {follower.stuck}", distance
+            contacts = robot.contacts
             robot.step(speed, turn_rate)
             distance += float(np.linalg.norm(robot.true_pose[:2] - place))
             place = robot.true_pose[:2]
+            if robot.contacts > contacts:
+                believed = slam.pose_now(self._wheel_now())
+                return f"{CONTACT}: touched a wall at {_shown(place)}, believed itself at {_shown(believed)}", distance
 
     def _is_blocked(self, rest: FloatArray) -> bool:
         """Whether what is left of the path leads through what is now known as a wall."""
@@ -298,7 +333,8 @@ class Episode:
         """A key pose where the robot is; what SLAM gets is the scan and the wheel odometry."""
         scan: Scan = self._robot.scan()
         wheel = self._wheel_now()
-        self._slam.add_key_pose(wheel, scan)
+        self._motions.append(self._slam.motion(wheel))
+        self._slam.add_key_pose(wheel, scan, motion=self._motions[-1])
         self._times.append(self._time_at_start + self._robot.time)
         self._truth.append(self._robot.true_pose)
         self._wheel.append(wheel)
@@ -310,10 +346,10 @@ class Episode:
 
 
 def _shown(pose: FloatArray) -> str:
-    return f"({pose[0]:.1f}, {pose[1]:.1f})"
+    return f"({pose[0]:.2f}, {pose[1]:.2f})"
 
 
-def achieved_entropy(graph: PoseGraph, num_existing: int, objective: ObjectiveName) -> float:
+def achieved_entropy(graph: PoseGraph, num_existing: int, objective: str) -> float:
     """The objective of a graph whose first `num_existing` poses stood before the leg, nats."""
     among = (graph.edges < num_existing).all(axis=1)
     prior = PoseGraph(graph.poses[:num_existing], graph.edges[among], None, graph.information[among])

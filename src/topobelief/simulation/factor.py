@@ -27,7 +27,7 @@ class Factor:
     kind
         "odometry" between consecutive key poses, "closure" between others.
     note
-        Why the scans had no part in it; empty where they had.
+        Why the scans had no part in it, or that the wheels slipped; empty where both agreed.
     """
 
     i: int

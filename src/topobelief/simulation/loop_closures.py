@@ -32,7 +32,7 @@ def closure_candidates(
     Parameters
     ----------
     poses : shape (n, 3)
-        Estimate of all key poses.
+        Estimate[float] of all key poses.
     occupancy
         The map so far, in which nothing may stand between the two; None: no such test.
     search_radius

@@ -7,6 +7,7 @@ best (Umeyama, "Least-squares estimation of transformation parameters between tw
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -54,6 +55,15 @@ def alignment(estimate: FloatArray, truth: FloatArray) -> FloatArray:
 def aligned(estimate: FloatArray, truth: FloatArray) -> FloatArray:
     """The estimated poses moved onto the true ones as one rigid body, shape (n, 3)."""
     return SE2_GROUP.compose(np.broadcast_to(alignment(estimate, truth), estimate.shape), estimate)
+
+
+def from_start(estimate: FloatArray, truth: FloatArray) -> FloatArray:
+    """The estimated poses moved as one rigid body so that the first is the true one, shape (n, 3).
+
+    A run's start is known, so this shows how errors grow from nothing, where `aligned` spreads them over the whole run.
+    """
+    moved = SE2_GROUP.compose(truth[0], SE2_GROUP.inverse(estimate[0]))
+    return SE2_GROUP.compose(np.broadcast_to(moved, estimate.shape), estimate)
 
 
 def position_errors(estimate: FloatArray, truth: FloatArray) -> FloatArray:
@@ -108,9 +118,13 @@ def trajectory_errors(
 
 
 def run_metrics(record: Record) -> dict[str, float]:
-    """Named numbers of a run; seconds, metres and nats. `_before` is on the poses that existed before its last leg."""
+    """Named numbers of a run; seconds, metres and nats. `_before` is on the poses that existed before its last leg.
+
+    `goal_distance` and `believed_goal_distance` are the largest over the last legs to each goal, see `record.Leg`.
+    """
     legs = record.legs
     decided = [leg for leg in legs if leg.goal > 0]
+    last = {leg.goal: leg for leg in decided}.values()  # the last leg to each goal
     before = decided[-1].first_pose + 1 if decided else len(record.truth)
     values: dict[str, float] = {
         "goals": len(record.scenario.goals),
@@ -119,6 +133,8 @@ def run_metrics(record: Record) -> dict[str, float]:
         "poses_before": before,
         "closures": int(np.count_nonzero(np.abs(record.graph.edges[:, 0] - record.graph.edges[:, 1]) > 1)),
         "contacts": sum(leg.contacts for leg in legs),
+        "goal_distance": _largest(leg.goal_distance for leg in last),
+        "believed_goal_distance": _largest(leg.believed_goal_distance for leg in last),
         "distance": sum(leg.distance for leg in legs),
         "driven_seconds": sum(leg.driven_seconds for leg in legs),
         "candidates_seconds": sum(leg.candidates_seconds for leg in legs),
@@ -133,6 +149,11 @@ def run_metrics(record: Record) -> dict[str, float]:
     if decided:
         values |= {f"{name}_entropy": getattr(decided[-1], f"{name}_entropy") for name in ("prior", "predicted", "achieved")}
     return values
+
+
+def _largest(values: Iterable[float]) -> float:
+    """Of those that are numbers; nan without any."""
+    return max((value for value in values if not math.isnan(value)), default=math.nan)
 
 
 def position_covariances(graph: PoseGraph) -> FloatArray:

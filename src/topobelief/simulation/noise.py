@@ -17,8 +17,6 @@ from topobelief.geometry import SE2_GROUP
 from topobelief.simulation.factor import Factor
 
 PHYSICAL = "physical"
-PAPER_LEVELS = (0.1, 0.35, 0.85)
-"""xi, rad/m."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,17 +9,17 @@ import numpy as np
 
 from topobelief.arrays import FloatArray
 from topobelief.candidates.polyline import path_length
-from topobelief.errors import InvalidInputError
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.planning.objectives import ObjectiveName
 from topobelief.simulation.noise import InjectedNoise
 from topobelief.simulation.occupancy import OccupancyMap
 from topobelief.simulation.scan import Scan
 from topobelief.simulation.scenario import Scenario
 from topobelief.simulation.strategies import Choice
 
-ARRIVED, INTERRUPTED = "arrived", "interrupted"
+ARRIVED, MISSED, CONTACT, INTERRUPTED = "arrived", "missed", "contact", "interrupted"
+ARRIVAL_TOLERANCE = 0.3
+"""Distance from its goal, metres, within which a robot that believes to have arrived truly has."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +39,7 @@ class RunOptions:
     """
 
     strategy: str = "spanning_trees"
-    objective: ObjectiveName = "joint"
+    objective: str = "joint"
     seed: int = 0
     noise: InjectedNoise | None = None
     unknown: bool = False
@@ -56,7 +56,8 @@ class Leg:
     first_pose, last_pose
         Key poses at its begin and end.
     outcome
-        "arrived", "interrupted", or why it ended, in words.
+        "arrived", "interrupted", or why it ended, in words: "missed: ..." where the robot believed itself at the goal and was
+        not, "contact: ..." where its chassis touched a wall, "stuck: ...", "blocked: ...", "unreachable: ...".
     num_candidates, chosen
         The latter counts from 0.
     planned, distance
@@ -70,7 +71,10 @@ class Leg:
     driven_seconds
         Simulated time.
     contacts
-        Control periods in which the chassis touched a wall.
+        Physics steps (of 5 ms) in which the chassis touched a wall.
+    goal_distance, believed_goal_distance
+        From the goal at the end of the leg, of the robot's true position and of where it believed itself to be, metres; nan
+        where nothing was driven.
     """
 
     goal: int
@@ -89,11 +93,18 @@ class Leg:
     decision_seconds: float = 0.0
     driven_seconds: float = 0.0
     contacts: int = 0
+    goal_distance: float = float("nan")
+    believed_goal_distance: float = float("nan")
 
     @property
     def arrived(self) -> bool:
-        """Whether its goal was reached, by the robot's own estimate."""
+        """Whether its goal was reached: by the robot's own estimate, and in truth within `ARRIVAL_TOLERANCE`."""
         return self.outcome == ARRIVED
+
+    @property
+    def believed_arrived(self) -> bool:
+        """Whether its goal was reached by the robot's own estimate, which is all that the robot knows."""
+        return self.arrived or self.outcome.startswith(MISSED)
 
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
@@ -136,6 +147,8 @@ class KeyPoses:
         Seconds.
     truth, wheel_odometry : shape (n, 3)
         In the world; the latter from the known start on.
+    motions : shape (n, 3)
+        Since the key pose before, as the front end had tracked it when the key pose was made.
     scans
         n of them.
     """
@@ -143,19 +156,11 @@ class KeyPoses:
     times: FloatArray
     truth: FloatArray
     wheel_odometry: FloatArray
+    motions: FloatArray
     scans: tuple[Scan, ...]
 
     def __len__(self) -> int:
         return len(self.times)
-
-    def first(self, count: int) -> KeyPoses:
-        """The first `count` of them."""
-        return KeyPoses(
-            times=self.times[:count],
-            truth=self.truth[:count],
-            wheel_odometry=self.wheel_odometry[:count],
-            scans=self.scans[:count],
-        )
 
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
@@ -173,24 +178,6 @@ class History:
     key_poses: KeyPoses
     legs: tuple[Leg, ...]
     track: FloatArray
-
-    def before_goal(self, goal: int) -> History:
-        """The part that ends where the leg to a goal began.
-
-        Raises
-        ------
-        InvalidInputError
-            Where no leg to it began.
-        """
-        begun = [number for number, leg in enumerate(self.legs) if leg.goal == goal]
-        if not begun:
-            raise InvalidInputError(f"expected a run that set out for goal {goal}, got one of {len(self.legs)} legs")
-        key_poses = self.key_poses.first(self.legs[begun[0]].first_pose + 1)
-        return History(
-            key_poses=key_poses,
-            legs=self.legs[: begun[0]],
-            track=self.track[self.track[:, 0] <= key_poses.times[-1]],
-        )
 
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
@@ -211,7 +198,7 @@ class Record:
     deliberations
         Of this run.
     outcome
-        "arrived" where all goals were reached, else what the last leg says.
+        "arrived" where all goals that it set out for were reached, else what the last leg to the last of the others says.
     """
 
     scenario: Scenario
@@ -236,5 +223,5 @@ class Record:
 
     @property
     def num_goals_reached(self) -> int:
-        """How many goals were reached."""
+        """How many goals were reached in truth."""
         return sum(leg.arrived for leg in self.legs if leg.goal > 0)

@@ -5,7 +5,7 @@ metrics.csv       the metrics alone
 graph.g2o         the graph that was decided on, at its estimate
 registered.g2o    the same before noise was added
 key_poses.csv     true, estimated, dead-reckoned poses
-sensors.npz       scans and wheel odometry, bit for bit
+sensors.npz       scans, wheel odometry and tracked motions, bit for bit
 leg-N.json        a decision: candidates, ranking, bounds
 map.yaml, .pgm    a ROS map
 """
@@ -34,7 +34,7 @@ from topobelief.simulation.noise import InjectedNoise
 from topobelief.simulation.record import Deliberation, History, KeyPoses, Leg, Record, RunOptions
 from topobelief.simulation.scan import Scan
 
-SCHEMA = "topobelief.run/1"
+SCHEMA = "topobelief.run/2"
 RUN_FILE, SENSORS_FILE = "run.json", "sensors.npz"
 
 Writers = Mapping[str, Callable[[Path], object]]
@@ -113,6 +113,7 @@ def _write_sensors(path: Path, history: History) -> None:
         "times": key_poses.times,
         "truth": key_poses.truth,
         "wheel_odometry": key_poses.wheel_odometry,
+        "motions": key_poses.motions,
         "track": history.track,
         "ranges": np.array([scan.ranges for scan in scans]),
         "angles": np.array([scan.angles for scan in scans]),
@@ -134,6 +135,7 @@ def _read_sensors(path: Path, legs: tuple[Leg, ...]) -> History:
             times=columns["times"],
             truth=columns["truth"],
             wheel_odometry=columns["wheel_odometry"],
+            motions=columns["motions"],
             scans=tuple(Scan(ranges, angles, time=time, max_range=max_range) for ranges, angles, time, max_range in scans),
         )
         return History(key_poses=key_poses, legs=legs, track=columns["track"])

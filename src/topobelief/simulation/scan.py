@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from topobelief.arrays import BoolArray, FloatArray, frozen_floats
+from topobelief.arrays import BoolArray, FloatArray, ReadOnlyArrays, frozen_floats
 from topobelief.errors import InvalidInputError
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Scan:
+class Scan(ReadOnlyArrays):
     """Ranges by direction, measured at one moment from the centre of the robot.
 
     Parameters

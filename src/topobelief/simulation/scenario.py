@@ -18,11 +18,20 @@ from topobelief.simulation.robot_settings import RobotSettings
 from topobelief.world import World
 
 Place = tuple[float, float]
+SAFE_MARGIN = 0.1
+"""What paths should keep between the chassis and walls, metres: a robot leaves its path in bends and errs in its position."""
 
 
 @dataclass(frozen=True, slots=True)
 class CandidateRule:
-    """How candidate paths are found; names and units as in the room `candidates`."""
+    """How candidate paths are found; names and units as in the room `candidates`.
+
+    Attributes
+    ----------
+    max_detour, num_vertices
+    robot_radius
+        How far paths keep from walls, metres; at least the radius of the chassis, and better `SAFE_MARGIN` more.
+    """
 
     max_detour: float | None = 1.3
     num_vertices: int = 1000
@@ -78,6 +87,22 @@ class Scenario:
                     f"expected room for a robot of radius {self.robot.radius:g} m at the {what} ({x:g}, {y:g}), got "
                     f"a clearance of {max(0.0, float(clearance)):.2f} m; choose a place in the open"
                 )
+        if self.rule.robot_radius < self.robot.radius:
+            raise InvalidInputError(
+                f"expected paths planned for at least the chassis of {self.robot.radius:g} m in radius, got a robot_radius of "
+                f"{self.rule.robot_radius:g} m; raise it, or make the chassis smaller"
+            )
+
+    @property
+    def caution(self) -> str | None:
+        """What to know before driving: that paths lead close by walls. None where they do not."""
+        margin = self.rule.robot_radius - self.robot.radius
+        if margin >= SAFE_MARGIN - 1e-9:
+            return None
+        return (
+            f"robot_radius {self.rule.robot_radius:g} m leaves {margin:.2f} m beside the chassis of {self.robot.radius:g} m, "
+            f"less than the {SAFE_MARGIN:g} m that a robot needs in bends; paths keep more where its position error asks for it"
+        )
 
 
 def named_scenario(name: str) -> Scenario:

@@ -53,7 +53,7 @@ class Slam:
     ) -> None:
         self.settings = settings or FrontEndSettings()
         self._start, self._bounds, self._noise, self._rng = start, bounds, noise, rng
-        self._front = FrontEnd(settings=self.settings, start=start)
+        self._front = FrontEnd(settings=self.settings)
         self._driving = BackEnd(start)
         self._deciding = BackEnd(start) if noise is not None else self._driving
         self._map: OccupancyMap | None = None
@@ -69,6 +69,14 @@ class Slam:
     def poses(self) -> FloatArray:
         """The estimate that the robot drives by, shape (n, 3)."""
         return self._driving.poses
+
+    @property
+    def position_error(self) -> float:
+        """By how much the position at the newest key pose may be wrong, metres.
+
+        Two standard deviations in the direction that is known worst.
+        """
+        return 2 * math.sqrt(float(np.linalg.eigvalsh(self._driving.newest_covariance[:2, :2])[-1]))
 
     @property
     def registered(self) -> PoseGraph:
@@ -95,13 +103,33 @@ class Slam:
         """Whether the robot has moved enough since the last one."""
         return self._front.wants_key_pose(wheel_odometry)
 
-    def pose_now(self, wheel_odometry: FloatArray, scan: Scan | None = None) -> FloatArray:
-        """Where the robot believes to be between key poses, shape (3,)."""
-        return self._front.pose_now(self.poses[-1], wheel_odometry, scan)
+    def wants_scan(self, wheel_odometry: FloatArray) -> bool:
+        """Whether the wheels have turned enough since the last scan for `track` to match another."""
+        return self._front.wants_scan(wheel_odometry)
 
-    def add_key_pose(self, wheel_odometry: FloatArray, scan: Scan) -> None:
-        """Register a key pose, look for loop closures, and update the estimate once."""
-        odometry = self._front.add(wheel_odometry, scan)
+    def track(self, wheel_odometry: FloatArray, scan: Scan) -> None:
+        """Follow the motion since the last key pose by a scan."""
+        self._front.track(wheel_odometry, scan)
+
+    def motion(self, wheel_odometry: FloatArray) -> FloatArray:
+        """Motion since the last key pose, by scans and wheels, shape (3,)."""
+        return self._front.motion(wheel_odometry)
+
+    def pose_now(self, wheel_odometry: FloatArray) -> FloatArray:
+        """Where the robot believes to be between key poses, shape (3,)."""
+        return SE2_GROUP.compose(self.poses[-1], self.motion(wheel_odometry))
+
+    def add_key_pose(self, wheel_odometry: FloatArray, scan: Scan, *, motion: FloatArray | None = None) -> None:
+        """Register a key pose, look for loop closures, and update the estimate once.
+
+        Parameters
+        ----------
+        wheel_odometry : shape (3,)
+        scan
+        motion : shape (3,), optional
+            Where a run is played again: what `motion` said then.
+        """
+        odometry = self._front.add(wheel_odometry, scan, motion=motion)
         if odometry is None:
             return
         newest = SE2_GROUP.compose(self.poses[-1], odometry.measurement)

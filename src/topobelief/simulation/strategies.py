@@ -7,7 +7,6 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
-from typing import cast, get_args
 
 import numpy as np
 
@@ -16,9 +15,8 @@ from topobelief.errors import InvalidInputError
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.decision import Decision
-from topobelief.planning.evaluation import SignatureName
-from topobelief.planning.objectives import ObjectiveName
 from topobelief.planning.planner import Planner
+from topobelief.planning.registry import SIGNATURES
 
 STRATEGIES = ("spanning_trees", "von_neumann_approx", "von_neumann", "optimum", "standard", "shortest", "random")
 """Three signatures; "optimum" proves s_ST's ranking through; "standard" evaluates every candidate; the last two look away."""
@@ -68,7 +66,7 @@ def load_kernels() -> None:
         compile_kernels()
 
 
-def planner_on(graph: PoseGraph, objective: ObjectiveName, *, signature: SignatureName = "spanning_trees") -> Planner:
+def planner_on(graph: PoseGraph, objective: str, *, signature: str = "spanning_trees") -> Planner:
     """By increments to the graph and with bounds anchored in it, where numba is there; from scratch where it is not."""
     bounds = "fischer" if find_spec("numba") is None else "anchored"
     return Planner(graph, objective=objective, signature=signature, bounds=bounds, allow_dense_spectrum=True)
@@ -80,7 +78,7 @@ def choose(
     actions: Sequence[Action],
     lengths: FloatArray,
     *,
-    objective: ObjectiveName,
+    objective: str,
     rng: np.random.Generator,
 ) -> Choice:
     """The choice of a strategy; only "random" draws from `rng`.
@@ -99,8 +97,8 @@ def choose(
         What the planner minimises.
     """
     begin = time.perf_counter()
-    if checked_strategy(strategy) in get_args(SignatureName):
-        signature = cast("SignatureName", strategy)
+    if checked_strategy(strategy) in SIGNATURES:
+        signature = strategy
         planner = planner_on(graph, objective, signature=signature)
         best = planner.decide(actions, proof="none").best
         seconds = time.perf_counter() - begin

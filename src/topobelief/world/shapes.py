@@ -114,9 +114,10 @@ def polygons(shape: Shape) -> list[Polygon]:
     return [part for part in _shapely.get_parts(shape) if isinstance(part, Polygon) and part.area > 0]
 
 
-def holes(polygon: Polygon) -> ShapeArray:
-    """The holes of a polygon, each filled."""
-    return _shapely.polygons(_shapely.get_rings(polygon)[1:])
+def holes(shape: Polygon | MultiPolygon) -> ShapeArray:
+    """The holes of the polygons of a shape, each filled."""
+    rings, polygon = _shapely.get_rings(_shapely.get_parts(shape), return_index=True)
+    return _shapely.polygons(rings[np.r_[False, polygon[1:] == polygon[:-1]]])
 
 
 def outline(shape: Shape, spacing: float) -> FloatArray:
@@ -124,14 +125,30 @@ def outline(shape: Shape, spacing: float) -> FloatArray:
     return np.unique(_shapely.get_coordinates(_shapely.segmentize(shape, spacing)), axis=0)
 
 
+def largest_within(shapes: ShapeArray, others: ShapeArray) -> FloatArray:
+    """For each polygon the size (see `sizes`) of the largest of others that it contains, 0 where it contains none.
+
+    None of the others may cross the boundary of a polygon.
+    """
+    result = np.zeros(len(shapes))
+    other, shape = cast("Any", shapely.STRtree)(shapes).query(_shapely.points(points_within(others)), predicate="within")
+    np.maximum.at(result, shape, sizes(others)[other])
+    return result
+
+
 def extent(shapes: Shape | ShapeArray) -> FloatArray:
     """x_min, y_min, x_max, y_max of everything together, shape (4,)."""
     return _shapely.total_bounds(shapes)
 
 
+def extents(shapes: ShapeArray) -> FloatArray:
+    """x_min, y_min, x_max, y_max of each shape, shape (N, 4)."""
+    return _shapely.bounds(shapes)
+
+
 def sizes(shapes: ShapeArray) -> FloatArray:
     """Diagonal of the extent of each shape."""
-    x_min, y_min, x_max, y_max = _shapely.bounds(shapes).T
+    x_min, y_min, x_max, y_max = extents(shapes).T
     return np.hypot(x_max - x_min, y_max - y_min)
 
 
@@ -145,14 +162,26 @@ def points_within(shapes: ShapeArray) -> FloatArray:
     return _shapely.get_coordinates(_shapely.point_on_surface(shapes))
 
 
-def frechet_distance(waypoints: FloatArray, others: FloatArray) -> float:
-    """Discrete Fréchet distance of two polylines at the waypoints given, shapes (N, 2) and (M, 2)."""
-    return float(_shapely.frechet_distance(_shapely.linestrings(waypoints), _shapely.linestrings(others)))
-
-
 def nearest_part(shape: Shape, place: FloatArray) -> Polygon | None:
     """The polygon of a shape that contains a place or is nearest to it; None where the shape has none."""
     return min(polygons(shape), key=lambda part: float(part.distance(point(place))), default=None)
+
+
+class SegmentIndex:
+    """Straight segments, indexed by where they are.
+
+    Parameters
+    ----------
+    starts, ends : shape (N, 2)
+    """
+
+    def __init__(self, starts: FloatArray, ends: FloatArray) -> None:
+        self._tree = cast("Any", shapely.STRtree)(segments(starts, ends))
+
+    def near(self, place: FloatArray, distance: float) -> IntArray:
+        """Segments whose extent overlaps the square around a place: all within the distance from it, and some others."""
+        x, y = place.tolist()
+        return self._tree.query(shapely.box(x - distance, y - distance, x + distance, y + distance))
 
 
 class Region:

@@ -53,7 +53,8 @@ Start = Callable[..., Processes]
 @contextmanager
 def clusters(folder: Path) -> Iterator[Start]:
     """What starts clusters, which end with the block; their processes find the stand-ins and leave marks in the folder."""
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2]), "STUDY_PLAYS_FOLDER": str(folder)}
+    paths = [str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths)), "STUDY_PLAYS_FOLDER": str(folder)}
     with ExitStack() as stack:
 
         def start(*, num_workers: int = 2) -> Processes:

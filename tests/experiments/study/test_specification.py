@@ -64,7 +64,7 @@ def test_a_session_may_begin_with_a_recorded_graph(specification_file):
         ("closure_angle: 1.0", "closure_angle: 4", 11, "rule.closure_angle: expected a number above 0 and of at most 3.14159"),
         ("line_of_sight: false", "line_of_sight: maybe", 11, "rule.line_of_sight: expected true or false, got 'maybe'"),
         ("rule: {", "rule: {radius: 2, ", 11, "rule.radius: expected 'robot_radius', got the unknown key 'radius'"),
-        ("rule: {", "rule: {{", 12, "expected YAML, got other text: expected "),
+        ("rule: {", "rule: {{", 12, "expected YAML, got other text (while parsing a flow mapping expected "),
     ],
 )  # fmt: skip
 def test_mistakes_are_named_with_their_place(specification_file, old, new, line, message):

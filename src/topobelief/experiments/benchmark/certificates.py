@@ -13,9 +13,9 @@ from topobelief.arrays import FloatArray
 from topobelief.experiments.benchmark.sessions import ClosureStyle, candidate_paths, city_drive
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.decision import Decision
-from topobelief.planning.planner import BoundsName, Planner
+from topobelief.planning.planner import Planner
 
-FAMILIES: tuple[BoundsName, ...] = ("paper", "fischer", "anchored")
+FAMILIES = ("paper", "fischer", "anchored", "chain")
 
 
 def block_isotropic(sigma_position: float, sigma_rotation: float) -> FloatArray:
@@ -132,7 +132,7 @@ def proof_size(
     graph: PoseGraph,
     *,
     num_actions: int,
-    bounds: BoundsName,
+    bounds: str,
     sigma_position: float,
     sigma_rotation: float,
     repetitions: int,

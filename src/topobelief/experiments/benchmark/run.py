@@ -28,10 +28,10 @@ from topobelief.experiments.benchmark.sessions import BenchmarkSession, ClosureS
 from topobelief.experiments.benchmark.timing import SessionTimes, degree_seconds, time_session
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.formats import read_pose_graph
-from topobelief.planning.planner import BoundsName
 
 SCHEMA = "topobelief.benchmark/1"
 SIGMA_POSITION, SIGMA_ROTATIONS = 0.1, (0.01, 0.035, 0.085)  # the paper's noises, metres and radians
+SMALL = "small"
 _PACKAGES = ("numpy", "scipy", "numba", "qdldl", "gtsam")
 
 Progress = Callable[[str], None]
@@ -56,6 +56,8 @@ class BenchmarkPlan:
         Generated graphs for the error bounds, their poses and candidates.
     memory_sizes
         Poses of generated graphs whose peak memory is measured.
+    small
+        Poses and candidates of a session as the paper has them, which is measured first; None for none.
     seed
     """
 
@@ -67,6 +69,7 @@ class BenchmarkPlan:
     bounds_size: int = 1000
     bounds_actions: int = 200
     memory_sizes: tuple[int, ...] = (10_000, 100_000)
+    small: tuple[int, int] | None = (100, 20)
     seed: int = 0
 
     @staticmethod
@@ -161,11 +164,12 @@ def run_benchmark(plan: BenchmarkPlan, *, progress: Progress = lambda _: None) -
     graphs: dict[str, PoseGraph] = {}
     for name, graph in _graphs(plan, progress):
         session = _session(name, graph, plan)
+        num_actions = len(session.actions) // 2
 
         def tell(method: str, name: str = name) -> None:
             progress(f"{name}: {method}")
 
-        times = time_session(session, num_actions=plan.num_actions, repetitions=plan.repetitions, progress=tell)
+        times = time_session(session, num_actions=num_actions, repetitions=plan.repetitions, progress=tell)
         seconds = {**(result.degree_seconds or {}), name: degree_seconds(session, repetitions=plan.repetitions)}
         result = replace(result, sessions=(*result.sessions, times), degree_seconds=seconds)
         if graph.tangent_dim == 3 and name in {path.stem for path in plan.files}:
@@ -194,8 +198,8 @@ def run_benchmark(plan: BenchmarkPlan, *, progress: Progress = lambda _: None) -
 
 
 def _proofs(name: str, graph: PoseGraph, plan: BenchmarkPlan, progress: Progress) -> Iterator[ProofSize]:
-    """At each of the paper's noises, by the family that the planner chooses and by the anchored one."""
-    families: tuple[BoundsName, ...] = ("auto", "anchored")
+    """At each of the paper's noises, by the family that the planner chooses and by those anchored in the prior."""
+    families = ("auto", "chain", "anchored")
     for sigma, bounds in product(SIGMA_ROTATIONS, families):
         progress(f"{name}: proof at sigma_theta = {sigma}, bounds {bounds}")
         yield proof_size(
@@ -211,6 +215,9 @@ def _proofs(name: str, graph: PoseGraph, plan: BenchmarkPlan, progress: Progress
 
 
 def _graphs(plan: BenchmarkPlan, progress: Progress) -> Iterator[tuple[str, PoseGraph]]:
+    if plan.sizes and plan.small:
+        information = block_isotropic(SIGMA_POSITION, SIGMA_ROTATIONS[1])
+        yield SMALL, city_drive(plan.small[0], information, rng=np.random.default_rng(plan.seed))
     for path in plan.files:
         progress(f"{path.stem}: reading and optimising")
         yield path.stem, optimize(read_pose_graph(path))
@@ -221,7 +228,11 @@ def _graphs(plan: BenchmarkPlan, progress: Progress) -> Iterator[tuple[str, Pose
 
 
 def _session(name: str, graph: PoseGraph, plan: BenchmarkPlan) -> BenchmarkSession:
-    actions = candidate_paths(graph, 2 * plan.num_actions, rng=np.random.default_rng(plan.seed))
+    rng = np.random.default_rng(plan.seed)
+    if name == SMALL and plan.small:
+        actions = candidate_paths(graph, 2 * plan.small[1], num_new_poses=10, num_closures=6, rng=rng)
+    else:
+        actions = candidate_paths(graph, 2 * plan.num_actions, rng=rng)
     return BenchmarkSession(name, graph, actions)
 
 

@@ -182,7 +182,7 @@ def candidate_paths(
     for index, path in enumerate(paths):
         new = np.flatnonzero(closes[index])
         edges = np.concatenate([chain, np.column_stack([n + new, nearest[index, new]])])
-        actions.append(Action(_poses_along(graph, path), edges, matrix, label=f"path {index + 1}"))
+        actions.append(Action(_poses_along(graph, path), edges, matrix, label=f"path {index}", length=num_new_poses * step))
     return tuple(actions)
 
 

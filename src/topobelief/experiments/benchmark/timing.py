@@ -17,11 +17,11 @@ import numpy as np
 
 from topobelief.experiments.benchmark.baselines import Baseline, anchor_of, baselines
 from topobelief.experiments.benchmark.sessions import BenchmarkSession
+from topobelief.forms.action_batch import ActionBatch
+from topobelief.forms.degree_sums import DegreeSums
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.planning.action_batch import ActionBatch
 from topobelief.planning.planner import Planner
-from topobelief.signatures.degree_increments import DegreeEntropy
 
 Kind = Literal["standard", "lemma", "topology", "engine"]
 
@@ -169,9 +169,12 @@ def time_engine(
         Planner(graph, signature="von_neumann_approx").decide(actions, proof="none")
         return ""
 
-    def bounds(actions: Sequence[Action]) -> str:
-        decision = Planner(graph, bounds="fischer").decide(actions)
-        return f"{len(decision.survivors)} of {len(actions)} may be the best"
+    def bounds(family: str) -> Callable[[Sequence[Action]], str]:
+        def decide(actions: Sequence[Action]) -> str:
+            decision = Planner(graph, bounds=family).decide(actions)
+            return f"{len(decision.survivors)} of {len(actions)} may be the best"
+
+        return decide
 
     def optimum(actions: Sequence[Action]) -> str:
         decision = Planner(graph, bounds="auto").decide(actions, proof="optimal")
@@ -185,7 +188,9 @@ def time_engine(
     for name, decide in (
         ("signature s_ST", ranking),
         ("signature ŝ_VN", degrees),
-        ("signature and Fischer bounds", bounds),
+        ("signature and Fischer bounds", bounds("fischer")),
+        ("signature and anchored bounds", bounds("anchored")),
+        ("signature and chain bounds", bounds("chain")),
         ("proven optimum", optimum),
         ("exact J of all", exact),
     ):
@@ -209,9 +214,9 @@ def degree_seconds(session: BenchmarkSession, *, repetitions: int) -> float:
     """Seconds that the von Neumann entropy by degrees takes an action, median, once its edges stand in one array."""
     batch = ActionBatch(session.graph, session.actions)
     arrays = batch.edges, batch.edge_start, batch.num_new
-    entropy = DegreeEntropy(session.graph.topology)
-    entropy.of_extensions(*arrays)
-    return statistics.median(_seconds(lambda: entropy.of_extensions(*arrays)) for _ in range(repetitions)) / batch.count
+    sums = DegreeSums(session.graph.topology)
+    sums.of_extensions(*arrays)
+    return statistics.median(_seconds(lambda: sums.of_extensions(*arrays)) for _ in range(repetitions)) / batch.count
 
 
 def _time_baseline(
@@ -246,17 +251,12 @@ def _deviation(graph: PoseGraph, actions: Sequence[Action], log_dets: Sequence[f
 
 
 def _warm_up(session: BenchmarkSession) -> None:
-    """A decision of every kind on the session's own types of noise, with as many actions as make it incremental."""
-    from topobelief.planning.incremental import IncrementalEvaluation
-
-    for family in ("fischer", "anchored"):
-        evaluation = IncrementalEvaluation(
-            session.graph, "joint", "spanning_trees", False, family, "cholesky", anchor_of(session.graph)
-        )
-        evaluation.signatures(session.actions[:2])
-        evaluation.bounds(session.actions[:2])
-        evaluation.entropies(session.actions[:2])
-    Planner(session.graph, signature="von_neumann_approx").decide(session.actions[:2], proof="none")
+    """A decision of every kind on the session's own types of noise, by increments."""
+    for family in ("fischer", "anchored", "chain"):
+        planner = Planner(session.graph, bounds=family, engine="incremental", anchor=anchor_of(session.graph))
+        planner.decide(session.actions[:2])
+        planner.entropies(session.actions[:2])
+    Planner(session.graph, signature="von_neumann_approx", engine="incremental").decide(session.actions[:2], proof="none")
 
 
 def _seconds(work: Callable[[], object]) -> float:

@@ -24,8 +24,7 @@ from topobelief.io.floor_plan import read_world
 from topobelief.io.formats import read_pose_graph
 from topobelief.io.ros_map import Unknown
 from topobelief.io.yaml_fields import Field, read_fields
-from topobelief.planning.objectives import ObjectiveName
-from topobelief.planning.planner import BoundsName
+from topobelief.planning.registry import AUTO, BOUNDS, OBJECTIVES
 from topobelief.world import World
 
 _Entry = TypeVar("_Entry")
@@ -62,7 +61,7 @@ class Rule:
     closure_angle: float = math.pi
     min_index_gap: int = 5
     line_of_sight: bool = True
-    bounds: BoundsName = "fischer"
+    bounds: str = "fischer"
     determinant: Determinant = "cholesky"
 
 
@@ -104,7 +103,7 @@ class Specification:
     sessions: tuple[tuple[Session, tuple[str, ...]], ...]
     noises: tuple[Noise, ...]
     strategies: tuple[str, ...]
-    objectives: tuple[ObjectiveName, ...]
+    objectives: tuple[str, ...]
     seeds: tuple[int, ...]
     rule: Rule
 
@@ -125,13 +124,13 @@ def read_specification(path: StrPath) -> Specification:
     sessions = tuple(_session(name, field, folder, worlds) for name, field in fields["sessions"].entries().items())
     objectives = ("joint",)
     if "objectives" in fields:
-        objectives = _several(fields["objectives"], lambda item: item.choice(get_args(ObjectiveName)))
+        objectives = _several(fields["objectives"], lambda item: item.choice(OBJECTIVES))
     return Specification(
         worlds=worlds,
         sessions=sessions,
         noises=_several(fields["noises"], _noise),
         strategies=_several(fields["strategies"], lambda item: item.choice(STRATEGIES)),
-        objectives=cast("tuple[ObjectiveName, ...]", objectives),
+        objectives=objectives,
         seeds=_seeds(fields["seeds"]),
         rule=_rule(fields["rule"]) if "rule" in fields else Rule(),
     )
@@ -232,7 +231,7 @@ def _rule(field: Field) -> Rule:
         "closure_angle": lambda item: item.number(above=0, at_most=math.pi),
         "min_index_gap": lambda item: item.whole(at_least=2),
         "line_of_sight": Field.flag,
-        "bounds": lambda item: item.choice(get_args(BoundsName)),
+        "bounds": lambda item: item.choice((*BOUNDS, AUTO)),
         "determinant": lambda item: item.choice(get_args(Determinant)),
     }
     values = {key: readers[key](child) for key, child in keys.items()}

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import cast, get_args
 
 import numpy as np
 
@@ -14,9 +13,8 @@ from topobelief.bounds.entropy_bounds import Determinant
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.decision import Decision
-from topobelief.planning.evaluation import SignatureName
-from topobelief.planning.objectives import ObjectiveName
-from topobelief.planning.planner import BoundsName, Planner
+from topobelief.planning.planner import Planner
+from topobelief.planning.registry import SIGNATURES
 
 STRATEGIES = ("spanning_trees", "von_neumann", "von_neumann_approx", "optimum", "standard", "shortest", "random")
 """Three signatures; "optimum" proves s_ST's ranking through; "standard" evaluates every candidate; the last two look away."""
@@ -40,11 +38,11 @@ class Question:
     graph: PoseGraph
     actions: Sequence[Action]
     lengths: FloatArray
-    objective: ObjectiveName
-    bounds: BoundsName
+    objective: str
+    bounds: str
     determinant: Determinant
 
-    def planner(self, signature: SignatureName = "spanning_trees") -> Planner:
+    def planner(self, signature: str = "spanning_trees") -> Planner:
         """For this question; dense spectra are welcome, since the strategy was asked for by name."""
         return Planner(
             self.graph,
@@ -92,8 +90,8 @@ class Choice:
 def choose(strategy: str, question: Question, *, rng: np.random.Generator) -> Choice:
     """The choice of one of `STRATEGIES`; only "random" draws from `rng`."""
     begin = time.perf_counter()
-    if strategy in get_args(SignatureName):
-        choice = _by_bounds(question, cast("SignatureName", strategy))
+    if strategy in SIGNATURES:
+        choice = _by_bounds(question, strategy)
     else:
         choose_by: dict[str, Callable[[], Choice]] = {
             "optimum": lambda: _by_proof(question),
@@ -105,7 +103,7 @@ def choose(strategy: str, question: Question, *, rng: np.random.Generator) -> Ch
     return replace(choice, seconds=time.perf_counter() - begin)
 
 
-def _by_bounds(question: Question, signature: SignatureName) -> Choice:
+def _by_bounds(question: Question, signature: str) -> Choice:
     decision = question.planner(signature).decide(question.actions)
     return _certified(decision, decision.signatures)
 

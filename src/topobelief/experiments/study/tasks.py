@@ -15,7 +15,6 @@ import numpy as np
 
 from topobelief.experiments.study.specification import Noise, Rule, Session, Specification
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.planning.objectives import ObjectiveName
 from topobelief.world import World
 
 _RESULTS = 1  # raise it where the same task comes to have another result
@@ -41,7 +40,7 @@ class Task:
     session: Session
     noise: Noise
     strategy: str
-    objective: ObjectiveName
+    objective: str
     seed: int
     rule: Rule
 

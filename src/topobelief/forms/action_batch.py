@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from topobelief.arrays import FloatArray, IntArray
+from topobelief.forms.of_topology import weights_of
 from topobelief.graph.action import Action
 from topobelief.graph.fisher import FisherRows, fisher_rows
-from topobelief.graph.information import isotropic_weights, scalar_weights
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.graph.topology import Topology
 from topobelief.linalg.extensions import Extensions
@@ -31,19 +30,6 @@ class ActionBatch:
 
     graph: PoseGraph
     actions: tuple[Action, ...]
-
-    def holds(self, actions: Sequence[Action]) -> bool:
-        """Whether these are the very same actions."""
-        return len(actions) == len(self.actions) and all(a is b for a, b in zip(actions, self.actions, strict=True))
-
-    def places(self, actions: Sequence[Action]) -> list[int] | None:
-        """Where these very actions stand in the batch; None if one is not in it."""
-        places = [self._place.get(id(action)) for action in actions]
-        return [place for place in places if place is not None] if None not in places else None
-
-    @cached_property
-    def _place(self) -> dict[int, int]:
-        return {id(action): place for place, action in enumerate(self.actions)}
 
     @property
     def count(self) -> int:
@@ -103,14 +89,9 @@ class ActionBatch:
     @cached_property
     def scalar_weights(self) -> tuple[FloatArray, FloatArray]:
         """(w_p, w_r) of all edges."""
-        return scalar_weights_of(self.information)
+        return weights_of(self.information)
 
     def sums(self, values: FloatArray) -> FloatArray:
         """Sum over each action's edges, shape (K,)."""
         total = np.concatenate([[0.0], np.cumsum(values)])
         return total[self.edge_start[1:]] - total[self.edge_start[:-1]]
-
-
-def scalar_weights_of(information: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(w_p, w_r) of edges, as spanning-tree signatures take them; block-isotropic noise has its own."""
-    return isotropic_weights(information) or scalar_weights(information)

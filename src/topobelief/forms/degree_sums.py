@@ -1,12 +1,10 @@
-"""Von Neumann entropies by degrees of many extensions of one graph, from the degrees that they change.
+"""Degree sums of many extensions of one graph, from the degrees that they change.
 
-With S = sum over edges of the simple graph of 1 / (d(i) d(j)), only the edges at nodes whose degree changes, and the new ones,
+In S = sum over the edges of the simple graph of 1 / (d(i) d(j)) only the edges at nodes whose degree changes, and the new ones,
 change their terms (docs, the mathematics, section 7): O(sum of the degrees of those nodes).
 """
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 from scipy import sparse
@@ -18,8 +16,8 @@ from topobelief.linalg.compiled import compiled, in_parallel, num_threads, unset
 _EDGES_PER_THREAD = 10_000  # fewer are done before a thread has started
 
 
-class DegreeEntropy:
-    """Von Neumann entropy by degrees of a graph and of its extensions.
+class DegreeSums:
+    """S of a graph and of its extensions.
 
     Parameters
     ----------
@@ -33,13 +31,12 @@ class DegreeEntropy:
         i, j = np.divmod(np.unique(low * n + high), n)
         adjacency = sparse.csr_array((np.ones(2 * len(i)), (np.r_[i, j], np.r_[j, i])), shape=(n, n))
         adjacency.sort_indices()
-        self._num_nodes = n
         self._start, self._neighbours = adjacency.indptr.astype(np.int64), adjacency.indices.astype(np.int64)
         d = np.maximum(np.diff(self._start), 1).astype(float)
         self._sum = float(np.sum(1 / (d[i] * d[j])))
 
     def of_extensions(self, edges: IntArray, edge_start: IntArray, num_new: IntArray) -> FloatArray:
-        """Entropy of each extension, nats, shape (K,).
+        """S of each extension, shape (K,).
 
         Parameters
         ----------
@@ -56,7 +53,7 @@ class DegreeEntropy:
 
         parts = min(num_threads(), 1 + len(edges) // _EDGES_PER_THREAD)
         in_parallel(work, np.linspace(0, len(num_new), parts + 1).astype(int).tolist())
-        return (self._num_nodes + num_new) / 2 * math.log(2) - 0.5 * (self._sum + changes)
+        return self._sum + changes
 
 
 @compiled

@@ -1,0 +1,81 @@
+"""Where a robot starts: at a pose of the graph, or at a place from which it sees one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from numbers import Integral
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from topobelief.arrays import FloatArray, frozen_floats
+from topobelief.errors import InvalidInputError, PlanningError
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.world import World
+
+_SAME_PLACE = 1e-9  # metres
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Start:
+    """Where paths begin, and which pose of the graph their first new pose is joined to."""
+
+    pose: int  # index
+    place: FloatArray  # shape (2,), metres, world frame
+
+    def distance(self, graph: PoseGraph) -> float:
+        """Metres from the pose to the place; 0 where the robot stands at the pose."""
+        distance = float(np.linalg.norm(graph.positions[self.pose, :2] - self.place))
+        return distance if distance > _SAME_PLACE else 0.0
+
+
+def find_start(graph: PoseGraph, start: int | ArrayLike | Start | None = None, *, world: World | None = None) -> Start:
+    """The start that a caller means.
+
+    Parameters
+    ----------
+    graph
+    start
+        Index of a pose (counted from the end where it is negative), or a place of shape (2,) or (3,), metres, whose heading
+        is ignored. Default: the last pose. What this function returned is taken as it is.
+    world
+        Where given, a place must be in sight of a pose.
+
+    Returns
+    -------
+    Start
+        From a place: with the nearest pose in sight, the last of equally near ones.
+
+    Raises
+    ------
+    InvalidInputError
+        For an index out of range, what is neither index nor place, and a place in a graph in SE(3), where poses of several
+        storeys may lie above one another.
+    PlanningError
+        Where no pose is in sight of the place.
+    """
+    if isinstance(start, Start):
+        return start
+    if start is None or isinstance(start, Integral):
+        index = -1 if start is None else int(start)
+        if not -graph.num_poses <= index < graph.num_poses:
+            raise InvalidInputError(f"expected start as the index of a pose, at most {graph.num_poses - 1}, got {index}")
+        return Start(index % graph.num_poses, graph.positions[index, :2])
+    place = frozen_floats(start, name="start")
+    if place.shape not in ((2,), (3,)) or not np.isfinite(place).all():
+        raise InvalidInputError(f"expected start as the index of a pose or a finite place (x, y), got {start!r}")
+    if graph.group.position_dim != 2:
+        raise InvalidInputError(f"expected start as the index of a pose in a graph in {graph.group.name}, got a place")
+    place = place[:2]
+    distances = np.linalg.norm(graph.positions - place, axis=1)
+    in_sight = np.ones(graph.num_poses, dtype=bool)
+    if world is not None:
+        in_sight = world.visible(np.broadcast_to(place, graph.positions.shape), graph.positions)
+    if not in_sight.any():
+        raise PlanningError(
+            f"expected a start in sight of a pose of the graph, got ({place[0]:g}, {place[1]:g}), from which no pose is; "
+            "start at a pose"
+        )
+    distances[~in_sight] = np.inf
+    nearest = np.flatnonzero(distances <= distances.min() + _SAME_PLACE)[-1]
+    return Start(int(nearest), place)

@@ -1,0 +1,57 @@
+"""How a command line is read: no option is silently dropped, and some take one value or two."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import typer
+from typer.core import TyperCommand
+
+
+class Command(TyperCommand):
+    """A command that refuses an option given twice, of which the first would be dropped without a word."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse as usual, after the check."""
+        _, _, order = self.make_parser(ctx).parse_args(args=list(args))
+        for parameter, count in Counter(order).items():
+            if count > 1 and not getattr(parameter, "multiple", True) and not getattr(parameter, "is_flag", True):
+                times = "twice" if count == 2 else f"{count} times"
+                raise typer.BadParameter(f"expected it once, got it {times}.", ctx=ctx, param_hint=f"'{parameter.opts[0]}'")
+        return super().parse_args(ctx, args)
+
+
+class StartCommand(Command):
+    """A command whose option --start takes one number or two."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse as usual, two numbers after --start taken as one value."""
+        return super().parse_args(ctx, _pairs_joined(args, "--start"))
+
+
+def _pairs_joined(args: list[str], option: str) -> list[str]:
+    """Arguments in which the number that follows the value of an option is part of that value.
+
+    Examples
+    --------
+    >>> _pairs_joined(["--start", "1", "-2.5", "graph.g2o"], "--start")
+    ['--start', '1 -2.5', 'graph.g2o']
+    """
+    joined: list[str] = []
+    for arg in args:
+        value = joined[-1].removeprefix(f"{option}=") if joined else ""
+        of_option = value != joined[-1] if joined else False
+        if joined and (of_option or joined[-2:-1] == [option]) and _is_number(value) and _is_number(arg):
+            joined[-1] += f" {arg}"
+        else:
+            joined.append(arg)
+    return joined
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,65 @@
+"""Options of every command that reads a pose graph: what to leave out of the file, and what to assume about it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Literal, cast
+
+import typer
+
+if TYPE_CHECKING:
+    from topobelief.io.reading import ReadingOptions
+
+# The readers' own choices, repeated so that help need not load them; a test holds them together.
+Edge2Order = Literal["toro", "isam"]
+
+_READING = "Reading the graph"
+
+Drop = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="WHAT",
+        help="Leave out priors, gps, gravity, planes, landmarks, robust (edges), equiv, or indefinite (edges of such "
+        "information); may be repeated.",
+        rich_help_panel=_READING,
+    ),
+]
+RobustAsPlain = Annotated[
+    bool,
+    typer.Option(
+        "--robust-as-plain",
+        metavar="",
+        help="Take switchable and max-mixture edges for plain ones.",
+        rich_help_panel=_READING,
+    ),
+]
+Edge2OrderOption = Annotated[
+    Edge2Order,
+    typer.Option(metavar="NAME", help="Order of the information in EDGE2 lines: toro or isam.", rich_help_panel=_READING),
+]
+Component = Annotated[
+    str,
+    typer.Option(
+        metavar="WHICH",
+        help="Of a disconnected graph: all, the largest part, or that of the pose with this id.",
+        rich_help_panel=_READING,
+    ),
+]
+Planar = Annotated[
+    bool,
+    typer.Option("--planar", metavar="", help="Project a graph in 3D onto the plane.", rich_help_panel=_READING),
+]
+
+
+def reading_options(
+    drop: list[str] | None, *, robust_as_plain: bool, edge2_order: Edge2Order, component: str, planar: bool
+) -> ReadingOptions:
+    """What these options ask the readers for."""
+    from topobelief.io.reading import Droppable, ReadingOptions
+
+    return ReadingOptions(
+        drop=cast("list[Droppable]", drop or []),  # which checks them
+        robust_as_plain=robust_as_plain,
+        edge2_order=edge2_order,
+        component=component,
+        planar=planar,
+    )

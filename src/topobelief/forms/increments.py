@@ -1,0 +1,188 @@
+"""The forms after each of many actions, from those of the prior (docs, the mathematics, section 7)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import cached_property
+
+import numpy as np
+
+from topobelief.arrays import FloatArray
+from topobelief.forms.action_batch import ActionBatch
+from topobelief.forms.prior_factors import PriorFactors, form_of
+from topobelief.forms.protocol import ClosureForms, FormName, Forms, Part, Rows
+from topobelief.graph.action import posterior
+from topobelief.graph.topology import Topology
+from topobelief.linalg.estimate import Estimate
+from topobelief.linalg.increments import Increments, Wanted, diagonal_increments, log_det_increments
+
+_LARGEST_ERROR = 1.0  # nats; a factor that knows less is none
+_QR_SIZE = 1200  # up to here an evaluation from scratch may do better, by QR, than a factor
+_QR_ERROR = 1e-3  # nats; only beyond it is that worth its time
+
+
+class IncrementalForms(Forms[FloatArray], ClosureForms[FloatArray]):
+    """The forms after each action of a batch; each is computed when it is first needed and kept.
+
+    A value is nan where a factor of the prior is not to be trusted, or where it is not shared by enough actions.
+
+    Parameters
+    ----------
+    prior
+    batch
+        At least one action.
+    """
+
+    def __init__(self, prior: PriorFactors, batch: ActionBatch) -> None:
+        self._prior, self._batch = prior, batch
+        self._known: dict[tuple[FormName, float, Wanted], Increments] = {}
+
+    @property
+    def tangent_dim(self) -> int:
+        return self._prior.graph.tangent_dim
+
+    @property
+    def num_existing(self) -> int:
+        return self._prior.graph.num_poses
+
+    @property
+    def num_new(self) -> FloatArray:
+        return self._batch.num_new.astype(np.float64)
+
+    def of_topology(self, quantity: Callable[[Topology], float]) -> FloatArray:
+        return np.array([quantity(posterior(self._prior.graph, action).topology) for action in self._batch.actions])
+
+    def degree_sum(self) -> FloatArray:
+        return self._prior.degrees.of_extensions(self._batch.edges, self._batch.edge_start, self._batch.num_new)
+
+    def mean_log_noise(self) -> FloatArray:
+        total = self._prior.log_noise + self._batch.sums(np.linalg.slogdet(self._batch.information)[1])
+        return total / np.maximum(self._prior.graph.num_edges + self._batch.num_edges, 1)
+
+    @property
+    def weights(self) -> tuple[FloatArray, FloatArray]:
+        return self._weights
+
+    @cached_property
+    def _weights(self) -> tuple[FloatArray, FloatArray]:
+        pairs = zip(self._prior.scalar_weights, self._batch.scalar_weights, strict=True)
+        w_p, w_r = (np.concatenate(pair) for pair in pairs)
+        return w_p, w_r
+
+    @property
+    def isotropic(self) -> bool:
+        return self._prior.rows.weights is not None and self._batch.rows.weights is not None
+
+    def largest_lever_sum(self) -> FloatArray:
+        batch, before = self._batch, self._prior.lever_sums
+        count = len(before) + batch.extensions.node_start[-1]
+        action = np.repeat(np.arange(batch.count), batch.num_edges)
+        keys, which = np.unique(action * count + batch.extensions.edges[:, 0], return_inverse=True)
+        weights = batch.scalar_weights[0] * batch.rows.squared_lengths()
+        added = np.bincount(which, weights=weights, minlength=len(keys)).astype(np.float64)  # without edges it counts integers
+        action, source = np.divmod(keys, count)
+        old = source < len(before)
+        added[old] += before[source[old]]
+        largest = np.full(batch.count, before.max(initial=0.0))
+        np.maximum.at(largest, action, added)
+        return largest
+
+    def log_det(self, form: FormName, *, shift: float | FloatArray = 0.0, part: Part = "all") -> Estimate[FloatArray]:
+        """With a shift for each action, of those that have the most frequent one; the others are nan."""
+        if part == "new":
+            added = self._increments_of_new_poses(form)
+            return Estimate(added.forest + added.closures_held, added.error)
+        if isinstance(shift, np.ndarray):
+            values, counts = np.unique(shift, return_counts=True)
+            common = float(values[np.argmax(counts)])
+            whole = self.log_det(form, shift=common)
+            return Estimate(np.where(shift == common, whole.value, np.nan), whole.error)
+        added = self._increments(form, shift)
+        return self._extended(form, shift, added, added.closures)
+
+    def hadamard(self, form: FormName, *, shift: float | FloatArray = 0.0) -> Estimate[FloatArray]:
+        shifts = np.broadcast_to(shift, self._batch.count).astype(np.float64)
+        distinct, which = np.unique(shifts, return_inverse=True)
+        prior = [self._prior.hadamard(form, float(value)) for value in distinct]
+        rows, held = form_of(form, self._prior), self._prior.anchor
+        increments, errors = diagonal_increments(rows, held, self._batch.extensions, form_of(form, self._batch), shifts)
+        values = np.array([estimate.value for estimate in prior])[which] + increments
+        return Estimate(values, np.array([estimate.error for estimate in prior])[which] + errors)
+
+    def sheared_rotations(self, step: float, *, hadamard: bool) -> Estimate[FloatArray]:
+        """Not by increments: an action changes D and so N at the poses that it touches."""
+        return Estimate(np.full(self._batch.count, np.nan), np.full(self._batch.count, np.inf))
+
+    @property
+    def increments(self) -> IncrementalForms:
+        return self
+
+    def base(self) -> Estimate[FloatArray]:
+        added = self._known_of("joint") or self._increments("joint", 0.0, "parts")
+        return self._extended("joint", 0.0, added, np.zeros(self._batch.count))
+
+    def closures(self, form: FormName, rows: Rows = "all") -> Estimate[FloatArray]:
+        if rows == "all":
+            added = self._increments(form, 0.0)
+            return self._of_closures(form, added, added.closures)
+        if rows == "positions":
+            added = self._increments(form, 0.0, "parts")
+            return self._of_closures(form, added, added.first_rows)
+        chained = [added for (name, _, wanted), added in self._known.items() if name == form and isinstance(wanted, int)]
+        added = chained[0] if chained else self._increments(form, 0.0, "parts")
+        return self._of_closures(form, added, added.other_rows)
+
+    def chained_closures(self, window: int) -> Estimate[FloatArray]:
+        added = self._increments("joint", 0.0, window)
+        return self._of_closures("joint", added, added.chained)
+
+    def knows(self, form: FormName) -> bool:
+        return (form, 0.0, "closures") in self._known or (form, 0.0, "parts") in self._known
+
+    def _extended(self, form: FormName, shift: float, added: Increments, closures: FloatArray) -> Estimate[FloatArray]:
+        """ln det of the prior extended by the forests of new poses, plus what closures are said to add."""
+        prior = self._trusted(form, shift)
+        return Estimate(prior.value + added.forest + closures, prior.error + added.error)
+
+    def _of_closures(self, form: FormName, added: Increments, values: FloatArray) -> Estimate[FloatArray]:
+        """Exactly 0 where there are none."""
+        prior = self._trusted(form, 0.0)
+        known = values if math.isfinite(prior.value) else np.full_like(values, np.nan)
+        return Estimate(known, np.where(known == 0, 0.0, prior.error + added.error))
+
+    def _trusted(self, form: FormName, shift: float) -> Estimate[float]:
+        """ln det M of the prior with the error that all actions have in common; nan where that is too large."""
+        factor = self._prior.factor(form, shift)
+        value, error = factor.log_det.value, 2 * factor.log_det.error
+        small = factor.tree.num_free * factor.block_size <= _QR_SIZE
+        limit = _QR_ERROR if small else _LARGEST_ERROR
+        return Estimate(value if error <= limit else math.nan, error)
+
+    def _increments(self, form: FormName, shift: float, wanted: Wanted = "closures") -> Increments:
+        """What actions add to ln det of a form, by as little as is `wanted` of it."""
+        if wanted == "closures" and (form, shift, "parts") in self._known:
+            wanted = "parts"
+        key = form, shift, wanted
+        if key not in self._known:
+            first_rows = self._prior.graph.group.position_dim
+            self._known[key] = log_det_increments(
+                self._prior.factor(form, shift),
+                self._batch.extensions,
+                form_of(form, self._batch),
+                shift=shift,
+                wanted=wanted,
+                first_rows=first_rows,
+            )
+        return self._known[key]
+
+    def _increments_of_new_poses(self, form: FormName) -> Increments:
+        """Those of a computation of the whole form will do; without one, the prior need not be factored."""
+        for wanted in ("closures", "parts"):
+            if (form, 0.0, wanted) in self._known:
+                return self._known[form, 0.0, wanted]
+        return log_det_increments(None, self._batch.extensions, form_of(form, self._batch))
+
+    def _known_of(self, form: FormName) -> Increments | None:
+        """Any computation of a form so far."""
+        return next((added for (name, shift, _), added in self._known.items() if name == form and not shift), None)

@@ -1,0 +1,130 @@
+"""The forms after one action, from scratch: the reference for everything faster."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+
+import numpy as np
+
+from topobelief.arrays import FloatArray
+from topobelief.forms.of_topology import mean_log_noise, weights_of
+from topobelief.forms.protocol import FormName, Forms, Part
+from topobelief.graph.fisher import FisherRows, fisher_rows
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.graph.topology import Topology
+from topobelief.linalg import EdgeForm, Estimate, LogDetSolver, laplacian_form
+from topobelief.linalg.shear import sheared_log_det
+
+
+class GraphForms(Forms[float]):
+    """The forms of one graph; each is factored when it is first needed and kept.
+
+    Parameters
+    ----------
+    graph
+        Connected; after the action.
+    anchor
+        The pose that is held.
+    prior
+        The graph before the action, whose poses and edges come first. Default: the graph itself.
+    prior_rows
+        Its whitened rows, where they are known.
+    """
+
+    def __init__(
+        self, graph: PoseGraph, *, anchor: int, prior: PoseGraph | None = None, prior_rows: FisherRows | None = None
+    ) -> None:
+        self.graph, self.anchor = graph, anchor
+        self._prior, self._prior_rows = graph if prior is None else prior, prior_rows
+        self._solvers: dict[int, LogDetSolver] = {}
+        self._known: dict[tuple[FormName, float, Part], Estimate[float]] = {}
+
+    @property
+    def tangent_dim(self) -> int:
+        return self.graph.tangent_dim
+
+    @property
+    def num_existing(self) -> int:
+        return self._prior.num_poses
+
+    @property
+    def num_new(self) -> float:
+        return float(self.graph.num_poses - self._prior.num_poses)
+
+    def of_topology(self, quantity: Callable[[Topology], float]) -> float:
+        return quantity(self.graph.topology)
+
+    def degree_sum(self) -> float:
+        return self.graph.topology.degree_sum
+
+    def mean_log_noise(self) -> float:
+        return mean_log_noise(self.graph.information)
+
+    @property
+    def weights(self) -> tuple[FloatArray, FloatArray]:
+        return self._weights
+
+    @property
+    def isotropic(self) -> bool:
+        return self._rows.weights is not None
+
+    def largest_lever_sum(self) -> float:
+        sums = np.bincount(self.graph.edges[:, 0], weights=self.weights[0] * self._rows.squared_lengths())
+        return float(sums.max(initial=0.0))
+
+    def log_det(self, form: FormName, *, shift: float = 0.0, part: Part = "all") -> Estimate[float]:
+        key = form, shift, part
+        if key not in self._known:
+            self._known[key] = self._of_new_poses(form) if part == "new" else self._of_all_poses(form, shift)
+        return self._known[key]
+
+    def hadamard(self, form: FormName, *, shift: float = 0.0) -> Estimate[float]:
+        return self._solver(self.anchor).hadamard(self._form(form, self._rows), shift=shift)
+
+    def sheared_rotations(self, step: float, *, hadamard: bool) -> Estimate[float]:
+        return sheared_log_det(self._rows.joint(), self.split[0], self.graph.num_poses, self.anchor, step, hadamard=hadamard)
+
+    def knows(self, form: FormName) -> bool:
+        return (form, 0.0, "all") in self._known
+
+    @property
+    def increments(self) -> None:
+        return None
+
+    def _of_all_poses(self, name: FormName, shift: float) -> Estimate[float]:
+        form = self._form(name, self._rows)
+        strongest = name == "joint" and not shift  # the information matrix may be worst conditioned: its strongest pose is held
+        return self._solver(form.strongest_node() if strongest else self.anchor).log_det(form, shift=shift)
+
+    def _of_new_poses(self, name: FormName) -> Estimate[float]:
+        if self.num_new == 0:
+            return Estimate(0.0, 0.0)
+        form = self._form(name, self._new_rows)
+        return LogDetSolver(form.edges, self.graph.num_poses, np.arange(self.num_existing)).log_det(form)
+
+    def _form(self, name: FormName, rows: FisherRows) -> EdgeForm:
+        if name in ("trees_p", "trees_r"):
+            return laplacian_form(rows.edges, self.weights[name == "trees_r"][self.graph.num_edges - len(rows.edges) :])
+        return getattr(rows, name)()
+
+    def _solver(self, held: int) -> LogDetSolver:
+        """Forms of one block size share its ordering and symbolic factor."""
+        if held not in self._solvers:
+            self._solvers[held] = LogDetSolver(self.graph.edges, self.graph.num_poses, held)
+        return self._solvers[held]
+
+    @cached_property
+    def _weights(self) -> tuple[FloatArray, FloatArray]:
+        return weights_of(self.graph.information)
+
+    @cached_property
+    def _new_rows(self) -> FisherRows:
+        return fisher_rows(self.graph, first_edge=self._prior.num_edges)
+
+    @cached_property
+    def _rows(self) -> FisherRows:
+        if self._prior is self.graph:
+            return fisher_rows(self.graph)
+        prior = fisher_rows(self._prior) if self._prior_rows is None else self._prior_rows
+        return prior.joined(self._new_rows)

@@ -1,0 +1,33 @@
+"""Connected components of a pose graph, as pose graphs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from topobelief.arrays import IntArray
+from topobelief.graph.pose_graph import PoseGraph
+
+
+def components(graph: PoseGraph) -> list[PoseGraph]:
+    """The connected components, the one with the most poses first; of equal ones the one with the first pose.
+
+    Ids, the order of poses and of edges, and fixed poses are kept.
+
+    Examples
+    --------
+    >>> graph = PoseGraph([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [(1, 2)], None, np.eye(3), ids=[7, 8, 9])
+    >>> [part.ids.tolist() for part in components(graph)]
+    [[8, 9], [7]]
+    """
+    labels = graph.topology.component_labels
+    members = [np.flatnonzero(labels == label) for label in range(graph.topology.num_components)]
+    return [_part(graph, nodes) for nodes in sorted(members, key=lambda nodes: (-len(nodes), nodes[0]))]
+
+
+def _part(graph: PoseGraph, nodes: IntArray) -> PoseGraph:
+    """Some poses and the edges between them."""
+    inside = np.isin(graph.edges[:, 0], nodes)
+    edges = np.searchsorted(nodes, graph.edges[inside])
+    fixed = tuple(int(np.searchsorted(nodes, index)) for index in graph.fixed if index in nodes)
+    information = graph.information[inside] if inside.any() else np.eye(graph.tangent_dim)
+    return PoseGraph(graph.poses[nodes], edges, graph.measurements[inside], information, ids=graph.ids[nodes], fixed=fixed)

@@ -1,0 +1,32 @@
+"""Whether a graph stands near the maximum-likelihood estimate, without which entropies and bounds describe no map.
+
+chi^2 per degree of freedom is near 1 at the estimate if the information matrices are calibrated. At 100 the root mean square of
+the residuals is ten standard deviations: an estimate fits so badly only where noise is claimed ten times too small or closures
+are false. Of nine public files, seven that hold dead reckoning have 119 to 20 000 as filed and at most 1 once optimised. One
+whose noise is claimed far too large has 11 as filed: such graphs are not noticed, because optimised ones may have as much.
+"""
+
+from __future__ import annotations
+
+import warnings
+
+from topobelief.errors import NotOptimizedWarning
+from topobelief.graph.pose_graph import PoseGraph
+
+LARGEST_CHI2_PER_DOF = 100.0
+
+
+def misfit(graph: PoseGraph) -> str | None:
+    """A sentence on a graph that is far from its estimate; None for one that is not, and for a tree, which always fits."""
+    if graph.degrees_of_freedom <= 0 or graph.chi2 <= LARGEST_CHI2_PER_DOF * graph.degrees_of_freedom:
+        return None
+    return (
+        f"χ² per degree of freedom is about {graph.chi2 / graph.degrees_of_freedom:.0e}, so these poses are far from the "
+        "maximum-likelihood estimate and entropies and bounds taken at them mean little; optimise the graph first"
+    )
+
+
+def warn_of_misfit(graph: PoseGraph) -> None:
+    """Warn the caller's caller of a graph that is far from its estimate; Python tells each place of it once."""
+    if message := misfit(graph):
+        warnings.warn(f"{message} (topobelief.optimize)", NotOptimizedWarning, stacklevel=3)

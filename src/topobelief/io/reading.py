@@ -1,0 +1,89 @@
+"""How a pose-graph file is read: what to leave out and what to assume, and the graph with a note of each.
+
+A file that holds more than poses and edges between them is refused by default; `ReadingOptions` says what to do instead.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, TypedDict, get_args
+
+from topobelief.errors import InvalidInputError, ReadingWarning, require_choice
+from topobelief.graph.pose_graph import PoseGraph
+
+Droppable = Literal["priors", "gps", "gravity", "planes", "landmarks", "robust", "equiv", "indefinite"]
+Edge2Order = Literal["toro", "isam"]
+
+
+class ReadingKeywords(TypedDict, total=False):
+    """The keywords of the readers: the fields of `ReadingOptions`."""
+
+    drop: Droppable | Collection[Droppable]
+    robust_as_plain: bool
+    edge2_order: Edge2Order
+    component: int | str
+    planar: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ReadingOptions:
+    """What to leave out of a file and what to assume about it.
+
+    Parameters
+    ----------
+    drop
+        What to leave out, one word or several: "priors" (absolute priors on poses), "gps" (positions as from GPS), "gravity"
+        (directions of gravity and orientations of an IMU), "planes" (and lines), "landmarks", "robust" (edges that may be
+        outliers, with their switches), "equiv" (pairs of poses to merge), "indefinite" (edges whose information is not
+        positive definite). Vertices go together with their edges and FIX lines.
+    robust_as_plain
+        Read switchable and max-mixture edges as plain ones: correct measurements with the information that they state.
+    edge2_order
+        Order of the information in EDGE2 lines: I11 I12 I22 I33 I13 I23 ("toro") or I11 I12 I13 I22 I23 I33 ("isam").
+    component
+        Of a disconnected graph: "all" parts, the "largest" one (of equal ones the one with the lowest id), or the one that
+        holds the pose with this id or name.
+    planar
+        Project a graph in SE(3) onto the plane, as `topobelief.projected_to_plane` does.
+
+    Raises
+    ------
+    InvalidInputError
+        For a word that is none of these, and where robust edges are to be both dropped and read.
+    """
+
+    drop: Droppable | Collection[Droppable] = ()
+    robust_as_plain: bool = False
+    edge2_order: Edge2Order = "toro"
+    component: int | str = "all"
+    planar: bool = False
+
+    def __post_init__(self) -> None:
+        words = (self.drop,) if isinstance(self.drop, str) else tuple(self.drop)
+        for word in words:
+            require_choice("drop", word, get_args(Droppable))
+        require_choice("edge2_order", self.edge2_order, get_args(Edge2Order))
+        if self.robust_as_plain and "robust" in words:
+            raise InvalidInputError("expected robust edges to be dropped or read as plain ones, got both; choose one")
+        object.__setattr__(self, "drop", frozenset(words))
+
+
+class ReadGraph(NamedTuple):
+    """A graph and, for each option that changed it, a sentence that says what was dropped or assumed."""
+
+    graph: PoseGraph
+    notes: tuple[str, ...]
+
+    def warned(self) -> PoseGraph:
+        """The graph, each note issued as a `ReadingWarning` to whoever called the reader."""
+        for note in self.notes:
+            warnings.warn(note, ReadingWarning, stacklevel=3)
+        return self.graph
+
+
+def by_option(*drop: str) -> str:
+    """How to drop these kinds: on the command line, and in Python."""
+    words = list(dict.fromkeys(drop))
+    return f"{' '.join(f'--drop {word}' for word in words)} (in Python drop={words})"

@@ -1,0 +1,1 @@
+"""What is minimised, an objective a file, each written in terms of forms."""

@@ -1,0 +1,120 @@
+"""Engines as tests ask them, and one in dense NumPy, the reference of the others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from topobelief.arrays import FloatArray
+from topobelief.bounds.options import BoundOptions
+from topobelief.forms.of_graph import GraphForms
+from topobelief.forms.protocol import ClosureForms
+from topobelief.graph.fisher import fisher_rows
+from topobelief.linalg import laplacian_form
+from topobelief.linalg.estimate import Estimate
+from topobelief.linalg.extensions import Extensions
+from topobelief.planning.batch import Batch, Criteria
+from topobelief.planning.engine import Engine
+from topobelief.planning.incremental_engine import IncrementalEngine
+
+
+@dataclass
+class Judge:
+    """Signatures, bounds and entropies by one engine, as arrays with their errors."""
+
+    engine: Engine
+    criteria: Criteria
+
+    def batch(self, actions) -> Batch:
+        return Batch(self.engine, self.criteria, list(actions))
+
+    def signatures(self, actions) -> tuple[FloatArray, FloatArray]:
+        found = self.batch(actions).signatures()
+        return found.value, found.error
+
+    def bounds(self, actions) -> tuple[FloatArray, FloatArray]:
+        return self.batch(actions).bounds()
+
+    def entropies(self, actions) -> tuple[FloatArray, FloatArray]:
+        found = self.batch(actions).entropies()
+        return found.value, found.error
+
+    def extended(self, graph, anchor) -> Judge:
+        return Judge(self.engine.extended(graph, anchor), self.criteria)
+
+
+def judge(graph, kind=IncrementalEngine, *, anchor=None, determinant="cholesky", window=2, **criteria) -> Judge:
+    engine = kind(graph, graph.num_poses - 1 if anchor is None else anchor)
+    return Judge(engine, Criteria(options=BoundOptions(determinant, window), **criteria))
+
+
+# An engine of one's own: log-determinants of dense matrices ------------------------------------------------------------
+
+
+class DenseEngine(Engine):
+    """Each action alone, by dense matrices."""
+
+    batch_size = 1
+
+    def groups(self, actions):
+        return [(np.array([place]), DenseForms(self, action)) for place, action in enumerate(actions)]
+
+    def extended(self, graph, anchor):
+        return DenseEngine(graph, anchor)
+
+
+class DenseForms(GraphForms, ClosureForms[float]):
+    """Counts, topology and noise are the graph's; every determinant is dense."""
+
+    def __init__(self, engine: DenseEngine, action) -> None:
+        alone = engine.from_scratch(action)
+        super().__init__(alone.graph, anchor=engine.anchor, prior=engine.graph)
+        n, m = engine.graph.num_poses, engine.graph.num_edges
+        batch = Extensions.of(n, action.edges, np.array([0, len(action.edges)]), np.array([0, action.num_new_poses]))
+        rank = np.concatenate([np.zeros(n), 1 + np.argsort(batch.order)])  # along the path; 0 for poses that exist
+        closures = m + np.flatnonzero(~batch.planted)
+        self.in_base = np.concatenate([np.arange(m), m + np.flatnonzero(batch.planted)])
+        self.closing = closures[np.argsort(rank[self.graph.edges[closures]].max(axis=1), kind="stable")]
+
+    def rows(self, name, held, edges=slice(None)):
+        graph = self.graph
+        form = laplacian_form(graph.edges, self.weights[name == "trees_r"]) if "trees" in name else None
+        form = form or getattr(replace(fisher_rows(graph), weights=None), name)()
+        m, r, b = form.rows_i.shape
+        rows = np.zeros((m, r, graph.num_poses, b))
+        rows[np.arange(m), :, graph.edges[:, 0]], rows[np.arange(m), :, graph.edges[:, 1]] = form.rows_i, form.rows_j
+        rows = np.delete(rows, held, axis=2)[edges]
+        return rows.reshape(len(rows), r, rows.shape[2] * b)
+
+    def log_det(self, form, *, shift=0.0, part="all"):
+        rows = self.rows(form, np.arange(self.num_existing) if part == "new" else self.anchor)
+        return dense(np.einsum("mrx,mry->xy", rows, rows) + shift * np.eye(rows.shape[2]))
+
+    def base(self):
+        rows = self.rows("joint", self.anchor, self.in_base)
+        return dense(np.einsum("mrx,mry->xy", rows, rows))
+
+    def covariance(self, form, part=slice(None)):
+        base, seen = self.rows(form, self.anchor, self.in_base), self.rows(form, self.anchor, self.closing)[:, part]
+        seen = seen.reshape(seen.shape[0] * seen.shape[1], seen.shape[2])
+        return np.eye(len(seen)) + seen @ np.linalg.solve(np.einsum("mrx,mry->xy", base, base), seen.T)
+
+    def closures(self, form, rows="all"):
+        k = self.split[0]
+        return dense(self.covariance(form, {"all": slice(None), "positions": slice(k), "rotations": slice(k, None)}[rows]))
+
+    def chained_closures(self, window):
+        s, b = self.covariance("joint"), self.tangent_dim
+        ends = range(b, len(s) + 1, b)
+        parts = [dense(s[max(0, e - (window + 1) * b) : e, max(0, e - (window + 1) * b) : e]) for e in ends]
+        before = [dense(s[max(0, e - (window + 1) * b) : e - b, max(0, e - (window + 1) * b) : e - b]) for e in ends]
+        return Estimate(sum(p.value - q.value for p, q in zip(parts, before, strict=True)), 0.0)
+
+    @property
+    def increments(self):
+        return self
+
+
+def dense(matrix) -> Estimate[float]:
+    return Estimate(float(np.linalg.slogdet(matrix)[1]), 0.0)
