@@ -135,9 +135,9 @@ class BlockPattern:
 
     def dense_rows(self, form: EdgeForm) -> FloatArray:
         """All rows on all free variables, dense, shape (m r, size)."""
-        num_edges, r, b = form.rows_i.shape
-        edges = np.arange(num_edges * r) // r
-        return self.scattered(edges, form.rows_i.reshape(-1, b), form.rows_j.reshape(-1, b))
+        b = self.block_size
+        edge_of_row = np.indices(form.rows_i.shape[:2])[0].ravel()
+        return self.scattered(edge_of_row, form.rows_i.reshape(-1, b), form.rows_j.reshape(-1, b))
 
     def rows_at(self, form: EdgeForm, node: int) -> tuple[FloatArray, FloatArray]:
         """All rows on the variables of one free node, shape (d r, b), and what `magnitude` says of them, shape (b,)."""

@@ -116,7 +116,7 @@ class PriorForms:
         self._trees: dict[int, EliminationTree] = {}
         self._bases: dict[int, EliminationTree] = {}  # of the trees that keep an order
         self._factors: dict[tuple[FormName, float], FormFactor] = {}
-        self._strong_factors: dict[tuple[FormName, float], FormFactor] = {}
+        self._best: dict[tuple[FormName, float], FormFactor] = {}
         self._earlier = earlier
         if earlier is not None:
             earlier._earlier = None
@@ -148,14 +148,14 @@ class PriorForms:
         Where it does not matter which pose is held but rounding does, the one with the strongest rows is, if that is better.
         Where that is not enough, strong rows come last.
         """
-        factor = self._plain_factor(name, shift)
-        if not factor.log_det.error <= _STRONG_ROWS_ERROR and (name, shift) not in self._strong_factors:
-            form = form_of(name, self)
-            edges, num_nodes = self.graph.edges, self.graph.num_poses
-            apart = FormFactor.with_strong_rows_last(edges, num_nodes, factor.tree.held, form, shift=shift)
-            if apart is not None and apart.log_det.error < factor.log_det.error:
-                self._strong_factors[name, shift] = apart
-        return self._strong_factors.get((name, shift), factor)
+        if (name, shift) not in self._best:
+            factor, edges, num_nodes = self._plain_factor(name, shift), self.graph.edges, self.graph.num_poses
+            if not factor.log_det.error <= _STRONG_ROWS_ERROR:
+                form = form_of(name, self)
+                apart = FormFactor.with_strong_rows_last(edges, num_nodes, factor.tree.held, form, shift=shift)
+                factor = min(factor, apart or factor, key=lambda candidate: candidate.log_det.error)
+            self._best[name, shift] = factor
+        return self._best[name, shift]
 
     def _plain_factor(self, name: FormName, shift: float) -> FormFactor:
         if (name, shift) not in self._factors:
