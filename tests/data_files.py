@@ -1,4 +1,4 @@
-"""Where tests find real pose graphs and floor plans, which the project does not ship."""
+"""Where tests find real pose graphs and floor plans: one drive of our own ships with the project, the others do not."""
 
 from __future__ import annotations
 
@@ -10,8 +10,14 @@ import pytest
 _BESIDE_CHECKOUT = Path(__file__).resolve().parents[2] / "shared"
 
 
+RECORDED = "recorded.g2o"
+"""121 poses and 386 edges that the simulated robot recorded in the office."""
+
+
 def data_file(name: str) -> Path:
-    """A pose graph from $TOPOBELIEF_DATA, or from shared/data beside the checkout; skips where it is absent."""
+    """The recorded drive, or a graph from $TOPOBELIEF_DATA or shared/data beside the checkout; skips where that is absent."""
+    if name == RECORDED:
+        return Path(__file__).resolve().parents[1] / "examples" / "office" / RECORDED
     return _file_or_skip(Path(os.environ.get("TOPOBELIEF_DATA", _BESIDE_CHECKOUT / "data")) / name)
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from data_files import data_file
+from data_files import RECORDED, data_file
 from graphs import SE2_GROUP, SE3_GROUP, pose_graphs
 from topobelief.errors import DisconnectedGraphError, EstimationError
 from topobelief.estimation import _Problem, optimize
@@ -242,7 +242,9 @@ def test_a_general_optimiser_finds_the_same_minimum(group: Group, seed: int):
     assert np.abs(distances(graph.with_poses(poses_at(found.x)), estimate)).max() < 1e-4
 
 
-@pytest.mark.parametrize("name", ["csail.g2o", "manhattan3500.g2o", "kitti_05.g2o", "parking-garage.g2o", "smallGrid3D.g2o"])
+@pytest.mark.parametrize(
+    "name", [RECORDED, "csail.g2o", "manhattan3500.g2o", "kitti_05.g2o", "parking-garage.g2o", "smallGrid3D.g2o"]
+)
 def test_gtsam_agrees_where_it_runs(name: str):
     """Levenberg-Marquardt of GTSAM from our estimate gains next to nothing in its chi^2 and moves by next to nothing.
 

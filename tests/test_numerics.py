@@ -13,7 +13,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from data_files import data_file
+from data_files import RECORDED, data_file
 from graphs import SE2_GROUP, SE3_GROUP, Noise, noises, pose_graphs, random_pose_graph
 from references import DIGITS, exact_rows, log_det_exact
 from topobelief.bounds import entropy_bounds
@@ -230,7 +230,7 @@ def test_long_graphs_of_alike_edges(group, shape, ratio):
         assert joint_entropy_estimate(graph).error < 1e-4
 
 
-@pytest.mark.parametrize("name", ["csail.g2o", "intel.g2o"])
+@pytest.mark.parametrize("name", [RECORDED, "csail.g2o", "intel.g2o"])
 def test_real_graphs_with_extreme_information(name):
     """intel has one edge of information 2.7e12."""
     from topobelief.io.g2o import read_g2o

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 
-from data_files import data_file
+from data_files import RECORDED, data_file
 from graphs import pose_graphs
 from topobelief.errors import DisconnectedGraphError, FileError, InvalidInputError, TopobeliefError
 from topobelief.geometry import SE2_GROUP, SE3_GROUP
@@ -184,6 +184,7 @@ SIZES = {
     "parking-garage.g2o": (SE3_GROUP, 1661, 6275),
     "sphere2500.g2o": (SE3_GROUP, 2500, 4949),
     "smallGrid3D.g2o": (SE3_GROUP, 125, 297),
+    RECORDED: (SE2_GROUP, 121, 386),
 }
 
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from data_files import data_file
+from data_files import RECORDED, data_file
 from engines import DenseEngine, judge
 from graphs import SE2_GROUP, SE3_GROUP, Noise, random_action, random_pose_graph, sessions, shares_isotropic_noise
 from references import LOG_2_PI_E, log_det_exact
@@ -309,7 +309,7 @@ def test_an_action_that_closes_too_many_loops_for_a_dense_matrix_is_evaluated_fr
     np.testing.assert_allclose(found.entropies(actions)[0], entropies, rtol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["csail.g2o", "intel.g2o", "parking-garage.g2o"])
+@pytest.mark.parametrize("name", [RECORDED, "csail.g2o", "intel.g2o", "parking-garage.g2o"])
 def test_real_graphs(name):
     """One edge of intel.g2o carries information 2.7e12; there the evaluation from scratch is the less accurate."""
     graph = read_g2o(data_file(name))

@@ -12,7 +12,6 @@ by a von Neumann signature too. The proof evaluates J along the ranking and skip
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from importlib.util import find_spec
@@ -69,7 +68,8 @@ class Planner:
         Closures before each one on which the family "chain" conditions it.
     engine
         "scratch": each action alone. "incremental": all at once, by increments to a prior that is factored once (extra `fast`).
-        "auto": by increments where that is worth loading the compiled kernels.
+        "auto": by increments where there is enough to do to load the compiled kernels, which takes about a second; where many
+        small decisions are made in one process, "incremental" is faster.
     anchor
         Pose that the bounds hold. Default: the last one, where the robot is.
     normalized
@@ -277,7 +277,7 @@ class Planner:
         name = self._given_engine
         if name == AUTO:
             large = num_actions * self._graph.num_edges >= _INCREMENTAL_WORK
-            worthwhile = large or _kernels_are_loaded() or self._criteria.bounds in ("anchored", "chain")
+            worthwhile = large or self._criteria.bounds in ("anchored", "chain")
             name = "incremental" if worthwhile and _has_kernels() else "scratch"
         if name not in self._engines:
             self._engines[name] = chosen(ENGINES, name)(self._graph, self._anchor)
@@ -323,11 +323,6 @@ def _cheapest_bounds(engine: Engine, criteria: Criteria, actions: Sequence[Actio
     costs = np.array([action.cost for action in sample])
     num_open = np.count_nonzero(lower + costs <= (upper + costs).min()) - 1  # without the best
     return "fischer" if num_open <= _OPEN_SHARE * (len(sample) - 1) else "chain"
-
-
-def _kernels_are_loaded() -> bool:
-    """Whether this process has paid for loading the compiled kernels."""
-    return "topobelief.linalg.increments" in sys.modules
 
 
 def _has_kernels() -> bool:

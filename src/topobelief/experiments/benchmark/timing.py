@@ -162,26 +162,26 @@ def time_engine(
     graph = session.graph
 
     def ranking(actions: Sequence[Action]) -> str:
-        Planner(graph).decide(actions, proof="none")
+        Planner(graph, engine="incremental").decide(actions, proof="none")
         return ""
 
     def degrees(actions: Sequence[Action]) -> str:
-        Planner(graph, signature="von_neumann_approx").decide(actions, proof="none")
+        Planner(graph, engine="incremental", signature="von_neumann_approx").decide(actions, proof="none")
         return ""
 
     def bounds(family: str) -> Callable[[Sequence[Action]], str]:
         def decide(actions: Sequence[Action]) -> str:
-            decision = Planner(graph, bounds=family).decide(actions)
+            decision = Planner(graph, engine="incremental", bounds=family).decide(actions)
             return f"{len(decision.survivors)} of {len(actions)} may be the best"
 
         return decide
 
     def optimum(actions: Sequence[Action]) -> str:
-        decision = Planner(graph, bounds="auto").decide(actions, proof="optimal")
+        decision = Planner(graph, engine="incremental", bounds="auto").decide(actions, proof="optimal")
         return f"bounds {decision.bounds}, {decision.num_evaluations} exact evaluations"
 
     def exact(actions: Sequence[Action]) -> str:
-        Planner(graph).entropies(actions)
+        Planner(graph, engine="incremental").entropies(actions)
         return ""
 
     rows: list[MethodTime] = []
