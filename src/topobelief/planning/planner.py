@@ -68,7 +68,7 @@ class Planner:
         Closures before each one on which the family "chain" conditions it.
     engine
         "scratch": each action alone. "incremental": all at once, by increments to a prior that is factored once (extra `fast`).
-        "auto": by increments where there is enough to do to load the compiled kernels, which takes about a second; where many
+        "auto": by increments where there is enough to do to load the compiled kernels, which takes half a second; where many
         small decisions are made in one process, "incremental" is faster.
     anchor
         Pose that the bounds hold. Default: the last one, where the robot is.
