@@ -20,6 +20,7 @@ from topobelief.errors import PlanningError
 from topobelief.geometry import SE2_GROUP
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
+from topobelief.planning.compile_kernels import load_kernels
 from topobelief.planning.planner import Planner
 from topobelief.simulation.path_following import PathFollower
 from topobelief.simulation.record import (
@@ -39,8 +40,9 @@ from topobelief.simulation.robot import Robot
 from topobelief.simulation.scan import Scan
 from topobelief.simulation.scenario import Goal, Scenario
 from topobelief.simulation.slam import Slam
-from topobelief.simulation.strategies import choose, load_kernels, planner_on
 from topobelief.simulation.ways import candidate_paths, place_with_room, stands_in_the_way
+from topobelief.strategies.choose import choose
+from topobelief.strategies.question import Question
 from topobelief.world import World
 
 _BLOCKED = "blocked: by something unknown before, seen from"
@@ -235,19 +237,21 @@ class Episode:
         )
         candidates_seconds = time.perf_counter() - begin
         lengths = np.array([path_length(path) for path in paths])
-        rng = self._rng(_CHOICE, len(self._legs))
-        choice = choose(options.strategy, belief, actions, lengths, objective=options.objective, rng=rng)
-        entropies = planner_on(belief, options.objective).entropies(actions)
+        drawn = int(self._rng(_CHOICE, len(self._legs)).integers(len(actions)))
+        random_scores = np.eye(len(actions))[drawn]
+        question = Question(belief, actions, lengths, random_scores, options.objective)
+        choice = choose(options.strategy, question)
+        entropies = question.planner().entropies(actions)
         deliberation = Deliberation(
             leg=len(self._legs), prior=belief, paths=paths, actions=actions, entropies=entropies, choice=choice
         )
         return deliberation, replace(
             leg,
             num_candidates=len(paths),
-            chosen=choice.action,
-            planned=float(lengths[choice.action]),
+            chosen=choice.index,
+            planned=float(lengths[choice.index]),
             prior_entropy=achieved_entropy(belief, belief.num_poses, options.objective),
-            predicted_entropy=float(entropies[choice.action]),
+            predicted_entropy=float(entropies[choice.index]),
             candidates_seconds=candidates_seconds,
             decision_seconds=choice.seconds,
         )

@@ -12,8 +12,8 @@ import yaml
 from topobelief.experiments.study.rows import COLUMNS, UNREPEATABLE
 from topobelief.experiments.study.session import play
 from topobelief.experiments.study.specification import Rule, read_specification
-from topobelief.experiments.study.strategies import STRATEGIES
 from topobelief.experiments.study.tasks import tasks_of
+from topobelief.strategies.registry import STRATEGIES
 
 ROOT = Path(__file__).resolve().parents[3]
 PAGE = (ROOT / "docs" / "study.md").read_text(encoding="utf-8")
@@ -41,7 +41,7 @@ def test_the_specification_of_the_page_is_one(tmp_path):
     (tmp_path / "depot.pgm").write_bytes(b"P5\n2 2\n255\n\xff\xff\xff\xff")
     (tmp_path / "study.yaml").write_text(text)
     found = read_specification(tmp_path / "study.yaml")
-    assert found.strategies == STRATEGIES
+    assert found.strategies == tuple(STRATEGIES)
     assert [names for _, names in found.sessions] == [("office",), ("office",)]
 
 

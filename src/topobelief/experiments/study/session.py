@@ -20,12 +20,13 @@ from topobelief.candidates.diverse_paths import diverse_paths
 from topobelief.candidates.polyline import path_length
 from topobelief.candidates.predicted_factors import predict_actions
 from topobelief.candidates.roadmap import build_roadmap
-from topobelief.experiments.study.strategies import Question, choose
 from topobelief.experiments.study.tasks import Task
 from topobelief.graph.action import Action, posterior
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.decision_quality import DecisionQuality, decision_quality
 from topobelief.planning.planner import Planner
+from topobelief.strategies.choose import choose
+from topobelief.strategies.question import Question
 
 TIE = 1e-6
 """Nats: a choice that loses no more than this is as good as the best, and an order broken by no more is kept."""
@@ -65,39 +66,41 @@ def play(task: Task) -> Row:
         graph, seconds = posterior(graph, actions[best]), seconds + spent
     lengths, actions, spent = _candidates(task, graph, last)
     rule = task.rule
-    question = Question(graph, actions, lengths, task.objective, rule.bounds, rule.determinant)
-    choice = choose(task.strategy, question, rng=task.rng)
+    random_scores = task.rng.permutation(len(actions)).astype(np.float64)
+    question = Question(graph, actions, lengths, random_scores, task.objective, rule.bounds, rule.determinant)
+    choice = choose(task.strategy, question)
+    reasons = choice.reasons
     begin = time.perf_counter()
     values = question.planner().entropies(actions)
     spread = float(np.ptp(values))
-    quality = None if choice.scores is None else decision_quality(values, choice.scores)
+    quality = None if reasons.scores is None else decision_quality(values, reasons.scores)
     scored = time.perf_counter() - begin
-    chosen = actions[choice.action]
-    loss = float(values[choice.action] - values.min())
+    chosen = actions[choice.index]
+    loss = float(values[choice.index] - values.min())
     return {
         "num_poses": graph.num_poses,
         "num_edges": graph.num_edges,
         "num_candidates": len(actions),
-        "chosen": choice.action,
-        "length": float(lengths[choice.action]),
+        "chosen": choice.index,
+        "length": float(lengths[choice.index]),
         "num_new_poses": chosen.num_new_poses,
         "num_closures": chosen.num_closures,
-        "value": float(values[choice.action]),
+        "value": float(values[choice.index]),
         "best_value": float(values.min()),
         "spread": spread,
         "loss": loss,
         "action_consistent": loss <= TIE,
-        "signature": None if choice.scores is None else float(choice.scores[choice.action]),
-        "lower": choice.lower,
-        "upper": choice.upper,
-        "error_bound": choice.error_bound,
-        "num_survivors": choice.num_survivors,
-        "num_evaluations": choice.num_evaluations,
-        "proven_optimal": choice.proven_optimal,
+        "signature": None if reasons.scores is None else float(reasons.scores[choice.index]),
+        "lower": reasons.lower,
+        "upper": reasons.upper,
+        "error_bound": reasons.error_bound,
+        "num_survivors": reasons.num_survivors,
+        "num_evaluations": reasons.num_evaluations,
+        "proven_optimal": reasons.proven_optimal,
         **_quality_columns(quality, spread),
         "candidate_lengths": lengths.tolist(),
         "candidate_values": values.tolist(),
-        "candidate_scores": None if choice.scores is None else choice.scores.tolist(),
+        "candidate_scores": None if reasons.scores is None else reasons.scores.tolist(),
         "version": version("topobelief"),
         "candidates_seconds": seconds + spent,
         "decision_seconds": choice.seconds,

@@ -17,7 +17,6 @@ from topobelief.arrays import FloatArray
 from topobelief.bounds.entropy_bounds import Determinant
 from topobelief.errors import FileError
 from topobelief.estimation import optimize
-from topobelief.experiments.study.strategies import STRATEGIES
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.files import StrPath
 from topobelief.io.floor_plan import read_world
@@ -25,6 +24,7 @@ from topobelief.io.formats import read_pose_graph
 from topobelief.io.ros_map import Unknown
 from topobelief.io.yaml_fields import Field, read_fields
 from topobelief.planning.registry import AUTO, BOUNDS, OBJECTIVES
+from topobelief.strategies.registry import STRATEGIES
 from topobelief.world import World
 
 _Entry = TypeVar("_Entry")
