@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 from pathlib import Path
 
@@ -47,9 +46,9 @@ def test_the_specification_of_the_page_is_one(tmp_path):
 
 def test_the_rule_of_the_page_is_the_default(tmp_path):
     said = yaml.safe_load(block_of_the_page())["rule"]
-    assert set(said) == {field.name for field in dataclasses.fields(Rule)}
+    assert set(said) == set(Rule().content)
     for name, value in said.items():
-        expected = getattr(Rule(), name)
+        expected = Rule().content[name]
         assert value == (pytest.approx(expected, abs=1e-5) if isinstance(expected, float) else expected), name
 
 

@@ -8,20 +8,15 @@ among the same candidates, so that their rows compare in pairs.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from importlib.metadata import version
 
 import numpy as np
 
-from topobelief.arrays import FloatArray
-from topobelief.candidates.diverse_paths import diverse_paths
-from topobelief.candidates.polyline import path_length
-from topobelief.candidates.predicted_factors import predict_actions
-from topobelief.candidates.roadmap import build_roadmap
+from topobelief.candidates.propose import Candidates, Routes, find_routes, predict_candidates
 from topobelief.experiments.study.tasks import Task
-from topobelief.graph.action import Action, posterior
+from topobelief.graph.action import posterior
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.decision_quality import DecisionQuality, decision_quality
 from topobelief.planning.planner import Planner
@@ -61,10 +56,11 @@ def play(task: Task) -> Row:
     graph, seconds = task.session.graph, 0.0
     last = len(task.session.goals) - 1
     for number in range(last):
-        _, actions, spent = _candidates(task, graph, number)
-        best = Planner(graph).decide(actions, proof="none").best
-        graph, seconds = posterior(graph, actions[best]), seconds + spent
-    lengths, actions, spent = _candidates(task, graph, last)
+        found, spent = _candidates(task, graph, number)
+        best = Planner(graph).decide(found.actions, proof="none").best
+        graph, seconds = posterior(graph, found.actions[best]), seconds + spent
+    found, spent = _candidates(task, graph, last)
+    actions, lengths = found.actions, found.lengths
     rule = task.rule
     random_scores = task.rng.permutation(len(actions)).astype(np.float64)
     question = Question(graph, actions, lengths, random_scores, task.objective, rule.bounds, rule.determinant)
@@ -121,32 +117,21 @@ def _quality_columns(quality: DecisionQuality | None, spread: float) -> Row:
     }
 
 
-def _candidates(task: Task, graph: PoseGraph, number: int) -> tuple[FloatArray, list[Action], float]:
-    """Lengths of the candidate paths to a goal, the actions along them, and the seconds that both took."""
-    paths, seconds = _paths(_Leg(task.place, number, task.seed, task))
-    begin, rule = time.perf_counter(), task.rule
-    actions = predict_actions(
-        graph,
-        paths,
-        information=task.noise.information,
-        spacing=rule.spacing,
-        closure_radius=rule.closure_radius,
-        closure_angle=rule.closure_angle,
-        min_index_gap=rule.min_index_gap,
-        world=task.world if rule.line_of_sight else None,
-    )
-    return np.array([path_length(path) for path in paths]), actions, seconds + time.perf_counter() - begin
+def _candidates(task: Task, graph: PoseGraph, number: int) -> tuple[Candidates, float]:
+    """Candidates for a goal, and the seconds that finding them took."""
+    routes, seconds = _routes(_Leg(task.place, number, task.seed, task))
+    begin = time.perf_counter()
+    rule = replace(task.rule.candidates, information=task.noise.information)
+    found = predict_candidates(graph, task.world, routes, rule)
+    return found, seconds + time.perf_counter() - begin
 
 
 @lru_cache(maxsize=16)
-def _paths(leg: _Leg) -> tuple[Sequence[FloatArray], float]:
-    """Paths of a leg and the seconds they took; neighbouring tasks differ in what comes after them alone."""
+def _routes(leg: _Leg) -> tuple[Routes, float]:
+    """Ways of a leg and the seconds they took; neighbouring tasks differ in what comes after them alone."""
     begin = time.perf_counter()
-    task, number, rule = leg.task, leg.number, leg.task.rule
+    task, number = leg.task, leg.number
     session = task.session
     start = session.graph.positions[-1] if number == 0 else session.goals[number - 1]
-    goal = session.goals[number]
-    max_detour = rule.max_detour if np.isfinite(rule.max_detour) else None
-    roadmap = build_roadmap(task.world, start, goal, rule.num_vertices, rule.robot_radius, task.seed)
-    paths = diverse_paths(roadmap, start, goal, session.num_paths[number], max_detour, task.seed)
-    return paths, time.perf_counter() - begin
+    rule = replace(task.rule.candidates, num_paths=session.num_paths[number], seed=task.seed)
+    return find_routes(task.world, start, session.goals[number], rule), time.perf_counter() - begin
