@@ -15,7 +15,7 @@ from topobelief.simulation.occupancy import OccupancyMap
 from topobelief.simulation.record import Deliberation, History, KeyPoses, Leg, Record, RunOptions
 from topobelief.simulation.scan import Scan
 from topobelief.simulation.scenario import Goal, Scenario
-from topobelief.simulation.strategies import Choice
+from topobelief.strategies.choice import Choice, Reasons
 from topobelief.world import World
 
 INFORMATION = np.diag([100.0, 100.0, 816.0])
@@ -96,7 +96,7 @@ def made_record(*, noise: InjectedNoise | None = None, outcome: str = "arrived",
                 paths=paths,
                 actions=actions,
                 entropies=entropies,
-                choice=Choice(decision.best, decision, 0.01),
+                choice=Choice(decision.best, 0.01, Reasons.of(decision)),
             ),
         ),
         "outcome": outcome,

@@ -86,7 +86,7 @@ def test_the_same_seed_is_the_same_run(house, injected):
 
 def test_injected_noise_changes_the_graph_and_not_the_driving_to_the_first_goal(physical, injected):
     """On one pose and no edge both rank the same; from there on decisions may differ."""
-    assert injected.deliberations[0].choice.action == physical.deliberations[0].choice.action
+    assert injected.deliberations[0].choice.index == physical.deliberations[0].choice.index
     n = physical.legs[0].last_pose
     np.testing.assert_array_equal(injected.truth[: n + 1], physical.truth[: n + 1])
     np.testing.assert_array_equal(injected.registered.measurements[:n], physical.registered.measurements[:n])

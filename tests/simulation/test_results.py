@@ -52,7 +52,7 @@ def test_files_agree_with_the_record(record, folder):
         metrics = {row["metric"]: float(row["value"]) for row in csv.DictReader(file)}
     assert metrics == pytest.approx(run_metrics(record))
     decision = json.loads((folder / "leg-2.json").read_text())
-    assert Decision.from_dict(decision["decision"]).best == record.deliberations[0].choice.action
+    assert Decision.from_dict(decision["decision"]).best == record.deliberations[0].choice.index
     assert [each["num_closures"] for each in decision["candidates"]] == [1, 0]
     json.dumps(run_document(record), allow_nan=False)
 

@@ -8,9 +8,10 @@ from shapely import Polygon
 
 from topobelief.candidates.diverse_paths import diverse_paths
 from topobelief.candidates.polyline import path_length, stations
+from topobelief.candidates.propose import CandidateRule
 from topobelief.candidates.roadmap import build_roadmap
 from topobelief.errors import InvalidInputError
-from topobelief.simulation.scenario import SCENARIO_NAMES, CandidateRule, Goal, Scenario, named_scenario
+from topobelief.simulation.scenario import SCENARIO_NAMES, Goal, Scenario, named_scenario
 from topobelief.world import World
 
 

@@ -2,18 +2,31 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
+from topobelief.candidates.propose import CandidateRule
 from topobelief.errors import PlanningError
-from topobelief.simulation.scenario import CandidateRule, Goal
-from topobelief.simulation.ways import candidate_paths, place_with_room, stands_in_the_way
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.simulation.scenario import Goal
+from topobelief.simulation.ways import known_candidates, place_with_room, stands_in_the_way
 from topobelief.world import World
 
 RULE = CandidateRule(num_vertices=150)
 SURE = {"chassis": 0.25, "position_error": 0.0}
+
+
+def candidate_paths(world, here, goal, rule, *, chassis, position_error, seed):
+    """Paths of a robot that knows nothing but where it is."""
+    belief = PoseGraph([here], np.zeros((0, 2), dtype=np.int64), None, np.eye(3))
+    rule = replace(rule, seed=seed, information=np.eye(3))
+    found = known_candidates(belief, world, goal, rule, chassis=chassis, position_error=position_error)
+    led = np.linalg.norm(found.paths[0][0] - here[:2])  # from the pose to where paths begin
+    assert np.array([action.length for action in found.actions]) == pytest.approx(found.lengths + led)
+    return found.paths
 
 
 @pytest.fixture(scope="module")

@@ -345,13 +345,15 @@ def plan(
 
     reporter = Reporter(as_json=as_json)
     with reporter.stage("start-up"):
+        from topobelief.candidates.propose import CandidateRule
         from topobelief.cli import plan_files, plan_stages
         from topobelief.planning.planner import Planner
 
     folder = plan_files.checked_folder(out if out is not None or as_json else Path("out"))
-    rule = plan_stages.CandidateRule(
+    limit = max_detour if max_detour is not None else math.inf if paper else 1.3
+    rule = CandidateRule(
         num_paths=candidates,
-        max_detour=max_detour if max_detour is not None else math.inf if paper else 1.3,
+        max_detour=limit if math.isfinite(limit) else None,
         num_vertices=vertices,
         robot_radius=robot_radius,
         seed=seed,

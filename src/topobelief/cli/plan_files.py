@@ -15,10 +15,10 @@ import numpy as np
 
 from topobelief.arrays import FloatArray
 from topobelief.candidates.polyline import path_length, path_poses
+from topobelief.candidates.propose import CandidateRule, Candidates
 from topobelief.candidates.start import Start
 from topobelief.cli.console import Reporter
 from topobelief.cli.plan import GivenStart
-from topobelief.cli.plan_stages import CandidateRule, Candidates
 from topobelief.errors import FileError
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.files import atomic_file

@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic
 
 import numpy as np
 
 from topobelief.arrays import FloatArray
-from topobelief.candidates.diverse_paths import diverse_paths
 from topobelief.candidates.homotopy import count_classes
-from topobelief.candidates.polyline import path_length
-from topobelief.candidates.predicted_factors import default_information, predict_actions
-from topobelief.candidates.roadmap import build_roadmap
+from topobelief.candidates.propose import CandidateRule, Candidates, find_routes, predict_candidates
 from topobelief.candidates.start import Start, find_start
 from topobelief.cli.console import Reporter
 from topobelief.cli.prior import read_prior
@@ -40,31 +36,6 @@ EXACT_SECONDS = 5.0
 _LENGTH_BIAS = 0.9  # rank correlation with the number of poses above which the ranking mostly counts them
 _FEWEST_TO_JUDGE = 6  # candidates
 _DOUBTFUL_SHARE = 0.1  # of the poses outside free space, above which map and graph may not belong together
-
-
-@dataclass(frozen=True, eq=False)
-class CandidateRule:
-    """How candidates are found and their factors predicted; names and units as in the room `candidates`."""
-
-    num_paths: int
-    max_detour: float
-    num_vertices: int
-    robot_radius: float
-    seed: int
-    spacing: float
-    closure_radius: float
-    closure_angle: float
-    min_index_gap: int
-    line_of_sight: bool
-    information: FloatArray | None  # None: the graph's own
-
-
-@dataclass(frozen=True, eq=False)
-class Candidates:
-    """K paths, shortest first, and what each would add to the graph."""
-
-    paths: list[FloatArray]
-    actions: list[Action]
 
 
 def information(sigma_p: float | None, sigma_theta: float | None) -> FloatArray | None:
@@ -185,38 +156,24 @@ def find_candidates(
     PlanningError
         Where there is no path; says also when poses are not in free space, which may be the cause.
     """
-    start = begin.place
-    max_detour = rule.max_detour if math.isfinite(rule.max_detour) else None
     try:
         with reporter.stage("paths"):
-            roadmap = build_roadmap(world, start, goal, rule.num_vertices, rule.robot_radius, rule.seed)
-            paths = diverse_paths(roadmap, start, goal, rule.num_paths, max_detour, rule.seed)
+            routes = find_routes(world, begin, goal, rule)
     except PlanningError as error:
         if outside := poses_outside(graph, world):
             raise PlanningError(f"{error}; {outside}") from None
         raise
-    lengths = [path_length(path) for path in paths]
-    classes = count_classes(roadmap, paths)
+    paths, lengths = routes.paths, routes.lengths
+    classes = count_classes(routes.roadmap, paths)
     at_least = "" if classes.is_exact else "at least "
     num_classes = at_least + _counted(classes.number, "homotopy class", "homotopy classes")
     fewer = f" of {rule.num_paths} asked for" if len(paths) < rule.num_paths else ""
     reporter.say(
-        f"{_counted(len(paths), 'path')}{fewer} from {_shown(start)} to {_shown(goal)}: "
-        f"{num_classes}, {min(lengths):.1f} to {max(lengths):.1f} m"
+        f"{_counted(len(paths), 'path')}{fewer} from {_shown(begin.place)} to {_shown(goal)}: "
+        f"{num_classes}, {lengths.min():.1f} to {lengths.max():.1f} m"
     )
     with reporter.stage("factors"):
-        actions = predict_actions(
-            graph,
-            paths,
-            information=default_information(graph) if rule.information is None else rule.information,
-            spacing=rule.spacing,
-            closure_radius=rule.closure_radius,
-            closure_angle=rule.closure_angle,
-            min_index_gap=rule.min_index_gap,
-            world=world if rule.line_of_sight else None,
-            start=begin,
-        )
-    return Candidates(paths, actions)
+        return predict_candidates(graph, world, routes, rule, start=begin)
 
 
 def exact_entropies(
@@ -279,7 +236,7 @@ def more_candidates_hint(decision: Decision, rule: CandidateRule, *, along_traje
         return None
     if rule.num_paths == 1:
         return "For something to choose from, raise --candidates (1 now)."
-    detour = f"raise --max-detour ({rule.max_detour:g} now), " if math.isfinite(rule.max_detour) else ""
+    detour = f"raise --max-detour ({rule.max_detour:g} now), " if rule.max_detour is not None else ""
     width = ", raise --width" if along_trajectory else ""
     return (
         f"For something to choose from, {detour}lower --robot-radius ({rule.robot_radius:g} m now){width} "

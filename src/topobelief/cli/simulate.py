@@ -74,7 +74,7 @@ def simulate(
         from topobelief.simulation.noise import parse_noise
         from topobelief.simulation.record import INTERRUPTED, RunOptions
         from topobelief.simulation.results import read_history, run_document
-        from topobelief.simulation.strategies import checked_strategy
+        from topobelief.strategies.registry import checked_strategy
 
         if displaced and not resume:
             raise InvalidInputError("expected --displaced together with --resume, got it alone")
@@ -159,7 +159,7 @@ def simulate_compare(
         from topobelief.simulation.comparison import summarised
         from topobelief.simulation.noise import parse_noise
         from topobelief.simulation.record import RunOptions
-        from topobelief.simulation.strategies import checked_strategy
+        from topobelief.strategies.registry import checked_strategy
 
         names = tuple(dict.fromkeys(checked_strategy(name.strip()) for name in strategies.split(",")))
         injected = parse_noise(noise)

@@ -10,17 +10,16 @@ path of largest s_ST has left in S1. Noise is sigma_p = 0.1 m and sigma_theta = 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 
 from topobelief.arrays import FloatArray
-from topobelief.candidates.diverse_paths import diverse_paths
 from topobelief.candidates.polyline import path_length
-from topobelief.candidates.predicted_factors import predict_actions
-from topobelief.candidates.roadmap import Roadmap, build_roadmap
+from topobelief.candidates.propose import CandidateRule, Routes, find_routes, predict_candidates
+from topobelief.candidates.roadmap import Roadmap
 from topobelief.graph.action import Action, posterior
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.planner import Planner
@@ -36,7 +35,7 @@ NOISES = (0.1, 0.35, 0.85)
 """xi = sigma_theta / sigma_p, rad/m."""
 OBJECTIVES: tuple[str, ...] = ("joint", "map", "per_pose")
 
-_CLOSURE_RADIUS, _CLOSURE_ANGLE, _MIN_INDEX_GAP, _SPACING = 2.0, 1.0, 2, 1.0  # m, rad, poses, m
+_RULE = CandidateRule(max_detour=None, spacing=1.0, closure_radius=2.0, closure_angle=1.0, min_index_gap=2, line_of_sight=False)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -157,24 +156,17 @@ def office_session(name: SessionName, seed: int, xi: float, *, num_paths: int | 
 def _session(
     name: SessionName, seed: int, xi: float, graph: PoseGraph, world: World, start: Place, goal: Goal, num_paths: int | None
 ) -> PlanningSession:
-    roadmap, paths = _routes(seed, start, goal.place, goal.num_paths if num_paths is None else num_paths)
-    actions = predict_actions(
-        graph,
-        paths,
-        information=block_isotropic(xi),
-        spacing=_SPACING,
-        closure_radius=_CLOSURE_RADIUS,
-        closure_angle=_CLOSURE_ANGLE,
-        min_index_gap=_MIN_INDEX_GAP,
-    )
-    return PlanningSession(name, seed, xi, world, roadmap, goal.place, graph, paths, tuple(actions))
+    routes = _routes(seed, start, goal.place, goal.num_paths if num_paths is None else num_paths)
+    found = predict_candidates(graph, world, routes, replace(_RULE, information=block_isotropic(xi)))
+    return PlanningSession(name, seed, xi, world, routes.roadmap, goal.place, graph, tuple(found.paths), tuple(found.actions))
 
 
 @lru_cache(maxsize=4)  # sessions that differ in noise alone share their paths
-def _routes(seed: int, start: Place, goal: Place, num_paths: int) -> tuple[Roadmap, tuple[FloatArray, ...]]:
+def _routes(seed: int, start: Place, goal: Place, num_paths: int) -> Routes:
     scenario = named_scenario("office")
-    roadmap = build_roadmap(scenario.world, start, goal, scenario.rule.num_vertices, scenario.rule.robot_radius, seed)
-    return roadmap, tuple(diverse_paths(roadmap, start, goal, num_paths, None, seed))
+    size, radius = scenario.rule.num_vertices, scenario.rule.robot_radius
+    rule = replace(_RULE, num_paths=num_paths, num_vertices=size, robot_radius=radius, seed=seed)
+    return find_routes(scenario.world, start, goal, rule)
 
 
 def action_rows(session: PlanningSession) -> list[ActionRow]:

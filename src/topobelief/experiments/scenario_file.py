@@ -20,13 +20,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TypeVar, cast, get_args
 
+from topobelief.candidates.propose import CandidateRule
 from topobelief.errors import InvalidInputError
 from topobelief.io.floor_plan import read_world
 from topobelief.io.ros_map import Unknown
 from topobelief.io.yaml_fields import Field, read_fields
 from topobelief.simulation.lidar import LidarSettings
 from topobelief.simulation.robot_settings import RobotSettings
-from topobelief.simulation.scenario import SAFE_MARGIN, SCENARIO_NAMES, CandidateRule, Goal, Scenario, named_scenario
+from topobelief.simulation.scenario import SAFE_MARGIN, SCENARIO_NAMES, Goal, Scenario, named_scenario
 
 _Settings = TypeVar("_Settings", RobotSettings, LidarSettings)
 

@@ -6,6 +6,7 @@ decision of each kind meets them all; it takes half a minute, or an instant if i
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,12 @@ def compile_kernels() -> None:
                 planner = Planner(graph, objective="map", engine="incremental", anchor=0, **choice)
                 _evaluate(planner, action)
                 _evaluate(planner.extended(grown), revisit)
+
+
+def load_kernels() -> None:
+    """The same where numba is installed; nothing otherwise. So the first decision by increments is as fast as the others."""
+    if find_spec("numba") is not None:
+        compile_kernels()
 
 
 def _evaluate(planner: Planner, action: Action) -> None:

@@ -36,5 +36,10 @@ AUTO = "auto"
 
 def chosen(choices: Mapping[str, str], name: str) -> Any:
     """What a name stands for."""
-    module, _, attribute = choices[name].partition(":")
+    return imported(choices[name])
+
+
+def imported(place: str) -> Any:
+    """What stands at a place, "module:attribute"."""
+    module, _, attribute = place.partition(":")
     return getattr(import_module(module), attribute)

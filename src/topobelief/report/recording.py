@@ -143,7 +143,7 @@ class _Recorder:
     def _candidates(self, record: Record, index: int, time: float) -> None:
         each = record.deliberations[index]
         lines = [self._lines(path, style.RULED_OUT, 0.03, kind="LineStrip") for path in each.paths]
-        lines.append(self._lines(each.paths[each.choice.action], style.BEST, 0.07, kind="LineStrip"))
+        lines.append(self._lines(each.paths[each.choice.index], style.BEST, 0.07, kind="LineStrip"))
         self._draw("/candidates", "candidates", lines, time)
 
     def _grid(self, record: Record, time: float) -> None:

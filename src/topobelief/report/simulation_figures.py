@@ -108,7 +108,7 @@ def draw_topologies(each: Deliberation, world: World, *, name: str) -> Figure:
             panel.map_axes()
             if place:
                 panel.axes.set_ylabel("")
-            chosen = ", chosen" if index == each.choice.action else ""
+            chosen = ", chosen" if index == each.choice.index else ""
             action = each.actions[index]
             canvas.title(
                 left,

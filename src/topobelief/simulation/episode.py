@@ -15,11 +15,11 @@ import numpy as np
 
 from topobelief.arrays import FloatArray
 from topobelief.candidates.polyline import path_length
-from topobelief.candidates.predicted_factors import predict_actions
 from topobelief.errors import PlanningError
 from topobelief.geometry import SE2_GROUP
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
+from topobelief.planning.compile_kernels import load_kernels
 from topobelief.planning.planner import Planner
 from topobelief.simulation.path_following import PathFollower
 from topobelief.simulation.record import (
@@ -39,8 +39,9 @@ from topobelief.simulation.robot import Robot
 from topobelief.simulation.scan import Scan
 from topobelief.simulation.scenario import Goal, Scenario
 from topobelief.simulation.slam import Slam
-from topobelief.simulation.strategies import choose, load_kernels, planner_on
-from topobelief.simulation.ways import candidate_paths, place_with_room, stands_in_the_way
+from topobelief.simulation.ways import known_candidates, place_with_room, stands_in_the_way
+from topobelief.strategies.choose import choose
+from topobelief.strategies.question import Question
 from topobelief.world import World
 
 _BLOCKED = "blocked: by something unknown before, seen from"
@@ -213,41 +214,40 @@ class Episode:
     def _deliberated(self, goal: Goal, leg: Leg) -> tuple[Deliberation, Leg]:
         """Candidates, the choice among them, and what all of them would have been worth."""
         begin, options, belief = time.perf_counter(), self._options, self._slam.belief
-        world = self._known_world()
-        paths = candidate_paths(
-            world,
-            belief.poses[-1],
-            goal,
-            self._scenario.rule,
-            chassis=self._scenario.robot.radius,
-            position_error=self._slam.position_error,
-            seed=options.seed,
-        )
         settings = self._slam.settings
-        actions = predict_actions(
-            belief,
-            paths,
-            information=settings.expected_information if belief.num_edges == 0 else None,
+        rule = replace(
+            self._scenario.rule,
+            seed=options.seed,
             spacing=settings.key_pose_distance,
             closure_radius=settings.search_radius,
             min_index_gap=settings.min_index_gap,
-            world=world,
+            information=settings.expected_information if belief.num_edges == 0 else None,
         )
+        found = known_candidates(
+            belief,
+            self._known_world(),
+            goal,
+            rule,
+            chassis=self._scenario.robot.radius,
+            position_error=self._slam.position_error,
+        )
+        actions, lengths = found.actions, found.lengths
         candidates_seconds = time.perf_counter() - begin
-        lengths = np.array([path_length(path) for path in paths])
-        rng = self._rng(_CHOICE, len(self._legs))
-        choice = choose(options.strategy, belief, actions, lengths, objective=options.objective, rng=rng)
-        entropies = planner_on(belief, options.objective).entropies(actions)
+        drawn = int(self._rng(_CHOICE, len(self._legs)).integers(len(actions)))
+        random_scores = np.eye(len(actions))[drawn]
+        question = Question(belief, actions, lengths, random_scores, options.objective)
+        choice = choose(options.strategy, question)
+        entropies = question.planner().entropies(actions)
         deliberation = Deliberation(
-            leg=len(self._legs), prior=belief, paths=paths, actions=actions, entropies=entropies, choice=choice
+            leg=len(self._legs), prior=belief, paths=found.paths, actions=actions, entropies=entropies, choice=choice
         )
         return deliberation, replace(
             leg,
-            num_candidates=len(paths),
-            chosen=choice.action,
-            planned=float(lengths[choice.action]),
+            num_candidates=len(actions),
+            chosen=choice.index,
+            planned=float(lengths[choice.index]),
             prior_entropy=achieved_entropy(belief, belief.num_poses, options.objective),
-            predicted_entropy=float(entropies[choice.action]),
+            predicted_entropy=float(entropies[choice.index]),
             candidates_seconds=candidates_seconds,
             decision_seconds=choice.seconds,
         )

@@ -15,7 +15,7 @@ from topobelief.simulation.noise import InjectedNoise
 from topobelief.simulation.occupancy import OccupancyMap
 from topobelief.simulation.scan import Scan
 from topobelief.simulation.scenario import Scenario
-from topobelief.simulation.strategies import Choice
+from topobelief.strategies.choice import Choice
 
 ARRIVED, MISSED, CONTACT, INTERRUPTED = "arrived", "missed", "contact", "interrupted"
 ARRIVAL_TOLERANCE = 0.3
@@ -29,7 +29,7 @@ class RunOptions:
     Attributes
     ----------
     strategy, objective
-        How paths are chosen (`strategies.checked_strategy`), and what the planner minimises.
+        How paths are chosen (`topobelief.strategies.registry`), and what the planner minimises.
     seed
         The same seed gives the same run on one machine.
     noise : InjectedNoise or None

@@ -163,7 +163,7 @@ def _deliberation(each: Deliberation) -> dict[str, object]:
     candidates = zip(each.paths, each.lengths.tolist(), each.actions, each.entropies.tolist(), strict=True)
     return {
         "num_poses": each.prior.num_poses,
-        "chosen": each.choice.action,
+        "chosen": each.choice.index,
         "decision": None if decision is None else decision.to_dict(),
         "candidates": [
             {

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from importlib.resources import as_file, files
 
+from topobelief.candidates.propose import CandidateRule
 from topobelief.errors import InvalidInputError, require_choice
 from topobelief.io.floor_plan import read_walls
 from topobelief.simulation.lidar import LidarSettings
@@ -20,22 +21,6 @@ from topobelief.world import World
 Place = tuple[float, float]
 SAFE_MARGIN = 0.1
 """What paths should keep between the chassis and walls, metres: a robot leaves its path in bends and errs in its position."""
-
-
-@dataclass(frozen=True, slots=True)
-class CandidateRule:
-    """How candidate paths are found; names and units as in the room `candidates`.
-
-    Attributes
-    ----------
-    max_detour, num_vertices
-    robot_radius
-        How far paths keep from walls, metres; at least the radius of the chassis, and better `SAFE_MARGIN` more.
-    """
-
-    max_detour: float | None = 1.3
-    num_vertices: int = 1000
-    robot_radius: float = 0.35
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +50,10 @@ class Scenario:
         In order; each ends a session.
     approach
         Places driven to in a straight line before the first goal, without a choice.
-    rule, robot, lidar
+    rule
+        Its `max_detour`, `num_vertices` and `robot_radius` count. The last is how far paths keep from walls, at least the
+        radius of the chassis, and better `SAFE_MARGIN` more. The goal says how many paths; the run and SLAM give the rest.
+    robot, lidar
     """
 
     name: str
@@ -73,7 +61,7 @@ class Scenario:
     start: tuple[float, float, float]
     goals: tuple[Goal, ...]
     approach: tuple[Place, ...] = ()
-    rule: CandidateRule = CandidateRule()
+    rule: CandidateRule = field(default_factory=CandidateRule)
     robot: RobotSettings = field(default_factory=RobotSettings)
     lidar: LidarSettings = field(default_factory=LidarSettings)
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from topobelief.arrays import FloatArray
-from topobelief.candidates.diverse_paths import diverse_paths
 from topobelief.candidates.polyline import distances_to_segments, path_length, stations
-from topobelief.candidates.roadmap import build_roadmap
+from topobelief.candidates.propose import CandidateRule, Candidates, propose
 from topobelief.errors import PlanningError
-from topobelief.simulation.scenario import CandidateRule, Goal
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.simulation.scenario import Goal
 from topobelief.world import World
 
 _NEAR = np.arange(0.05, 1.0, 0.05)  # m, in which a robot that stands too close to a wall looks for room
@@ -19,49 +21,44 @@ _TIGHT = 0.95  # of a goal's clearance, where that is less
 _STRAY = 0.07  # m that a robot leaves its path by at most, as was seen in bends
 
 
-def candidate_paths(
-    world: World, here: FloatArray, goal: Goal, rule: CandidateRule, *, chassis: float, position_error: float, seed: int
-) -> list[FloatArray]:
-    """Diverse paths to a goal, shortest first, each of shape (waypoints, 2).
+def known_candidates(
+    belief: PoseGraph, world: World, goal: Goal, rule: CandidateRule, *, chassis: float, position_error: float
+) -> Candidates:
+    """Diverse paths to a goal from where the robot believes to be, its last pose, and the factors that each would add.
 
-    They begin where the robot stands or, where that is too close to a wall (its estimate or its map may err), at the next place
-    with room. They keep as far from walls as the rule asks for, and at least so far that a robot that strays from its path and
-    errs in its position does not touch. Where the goal has less room than that, they keep what fits, but never less than the
-    chassis and the error of the position take.
+    Paths begin where the robot stands or, where that is too close to a wall (its estimate or its map may err), at the next
+    place with room. They keep as far from walls as the rule asks for, and at least so far that a robot that strays from its
+    path and errs in its position does not touch. Where the goal has less room than that, they keep what fits, but never less
+    than the chassis and the error of the position take.
 
     Parameters
     ----------
+    belief
     world
         As the robot knows it.
-    here : shape (3,)
-        Where it believes to be.
-    goal, rule
+    goal
+        It says how many paths.
+    rule
     chassis
         Its radius, metres.
     position_error
         What its position may be off by, metres.
-    seed
 
     Raises
     ------
     PlanningError
         Where there is no way.
     """
+    least = chassis + position_error
+    wanted = max(rule.robot_radius, least + _STRAY)
+    radius = max(least, min(wanted, _TIGHT * float(world.clearance([goal.place])[0])))
+    start = place_with_room(world, belief.positions[-1], radius)
     try:
-        return _paths(world, here, goal, rule, chassis + position_error, seed)
+        return propose(belief, world, start, goal.place, replace(rule, num_paths=goal.num_paths, robot_radius=radius))
     except PlanningError as error:
         raise PlanningError(
             f"{error}; paths keep room for the chassis of {chassis:g} m and a position error of {position_error:.2f} m"
         ) from None
-
-
-def _paths(world: World, here: FloatArray, goal: Goal, rule: CandidateRule, least: float, seed: int) -> list[FloatArray]:
-    """The same with the least distance from walls, metres."""
-    wanted = max(rule.robot_radius, least + _STRAY)
-    radius = max(least, min(wanted, _TIGHT * float(world.clearance([goal.place])[0])))
-    start = place_with_room(world, here[:2], radius)
-    roadmap = build_roadmap(world, start, goal.place, rule.num_vertices, radius, seed)
-    return diverse_paths(roadmap, start, goal.place, goal.num_paths, rule.max_detour, seed)
 
 
 def place_with_room(world: World, here: FloatArray, radius: float) -> FloatArray:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 from pathlib import Path
 
@@ -12,8 +11,8 @@ import yaml
 from topobelief.experiments.study.rows import COLUMNS, UNREPEATABLE
 from topobelief.experiments.study.session import play
 from topobelief.experiments.study.specification import Rule, read_specification
-from topobelief.experiments.study.strategies import STRATEGIES
 from topobelief.experiments.study.tasks import tasks_of
+from topobelief.strategies.registry import STRATEGIES
 
 ROOT = Path(__file__).resolve().parents[3]
 PAGE = (ROOT / "docs" / "study.md").read_text(encoding="utf-8")
@@ -41,15 +40,15 @@ def test_the_specification_of_the_page_is_one(tmp_path):
     (tmp_path / "depot.pgm").write_bytes(b"P5\n2 2\n255\n\xff\xff\xff\xff")
     (tmp_path / "study.yaml").write_text(text)
     found = read_specification(tmp_path / "study.yaml")
-    assert found.strategies == STRATEGIES
+    assert found.strategies == tuple(STRATEGIES)
     assert [names for _, names in found.sessions] == [("office",), ("office",)]
 
 
 def test_the_rule_of_the_page_is_the_default(tmp_path):
     said = yaml.safe_load(block_of_the_page())["rule"]
-    assert set(said) == {field.name for field in dataclasses.fields(Rule)}
+    assert set(said) == set(Rule().content)
     for name, value in said.items():
-        expected = getattr(Rule(), name)
+        expected = Rule().content[name]
         assert value == (pytest.approx(expected, abs=1e-5) if isinstance(expected, float) else expected), name
 
 

@@ -8,7 +8,7 @@ import pytest
 from topobelief.errors import PlanningError
 from topobelief.experiments.study.rows import COLUMNS, UNREPEATABLE
 from topobelief.experiments.study.session import play
-from topobelief.experiments.study.strategies import STRATEGIES
+from topobelief.strategies.registry import STRATEGIES
 
 ALL = f"[{', '.join(STRATEGIES)}]"
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
@@ -25,8 +23,9 @@ def test_all_that_is_said_is_read(specification_file):
     assert found.noises[1].xi == pytest.approx(0.85)
     assert np.diag(found.noises[1].information) == pytest.approx([100, 100, 0.085**-2])
     assert (found.strategies, found.objectives, found.seeds) == (("spanning_trees", "random"), ("joint",), (0, 1, 2))
-    assert (found.rule.max_detour, found.rule.line_of_sight, found.rule.num_vertices) == (math.inf, False, 120)
-    assert found.rule.closure_radius == 2.0  # not said: as in `topobelief plan`
+    rule = found.rule.candidates
+    assert (rule.max_detour, rule.line_of_sight, rule.num_vertices) == (None, False, 120)
+    assert rule.closure_radius == 2.0  # not said: as in `topobelief plan`
 
 
 def test_a_session_may_begin_with_a_recorded_graph(specification_file):

@@ -8,24 +8,20 @@ among the same candidates, so that their rows compare in pairs.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from importlib.metadata import version
 
 import numpy as np
 
-from topobelief.arrays import FloatArray
-from topobelief.candidates.diverse_paths import diverse_paths
-from topobelief.candidates.polyline import path_length
-from topobelief.candidates.predicted_factors import predict_actions
-from topobelief.candidates.roadmap import build_roadmap
-from topobelief.experiments.study.strategies import Question, choose
+from topobelief.candidates.propose import Candidates, Routes, find_routes, predict_candidates
 from topobelief.experiments.study.tasks import Task
-from topobelief.graph.action import Action, posterior
+from topobelief.graph.action import posterior
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.decision_quality import DecisionQuality, decision_quality
 from topobelief.planning.planner import Planner
+from topobelief.strategies.choose import choose
+from topobelief.strategies.question import Question
 
 TIE = 1e-6
 """Nats: a choice that loses no more than this is as good as the best, and an order broken by no more is kept."""
@@ -60,44 +56,47 @@ def play(task: Task) -> Row:
     graph, seconds = task.session.graph, 0.0
     last = len(task.session.goals) - 1
     for number in range(last):
-        _, actions, spent = _candidates(task, graph, number)
-        best = Planner(graph).decide(actions, proof="none").best
-        graph, seconds = posterior(graph, actions[best]), seconds + spent
-    lengths, actions, spent = _candidates(task, graph, last)
+        found, spent = _candidates(task, graph, number)
+        best = Planner(graph).decide(found.actions, proof="none").best
+        graph, seconds = posterior(graph, found.actions[best]), seconds + spent
+    found, spent = _candidates(task, graph, last)
+    actions, lengths = found.actions, found.lengths
     rule = task.rule
-    question = Question(graph, actions, lengths, task.objective, rule.bounds, rule.determinant)
-    choice = choose(task.strategy, question, rng=task.rng)
+    random_scores = task.rng.permutation(len(actions)).astype(np.float64)
+    question = Question(graph, actions, lengths, random_scores, task.objective, rule.bounds, rule.determinant)
+    choice = choose(task.strategy, question)
+    reasons = choice.reasons
     begin = time.perf_counter()
     values = question.planner().entropies(actions)
     spread = float(np.ptp(values))
-    quality = None if choice.scores is None else decision_quality(values, choice.scores)
+    quality = None if reasons.scores is None else decision_quality(values, reasons.scores)
     scored = time.perf_counter() - begin
-    chosen = actions[choice.action]
-    loss = float(values[choice.action] - values.min())
+    chosen = actions[choice.index]
+    loss = float(values[choice.index] - values.min())
     return {
         "num_poses": graph.num_poses,
         "num_edges": graph.num_edges,
         "num_candidates": len(actions),
-        "chosen": choice.action,
-        "length": float(lengths[choice.action]),
+        "chosen": choice.index,
+        "length": float(lengths[choice.index]),
         "num_new_poses": chosen.num_new_poses,
         "num_closures": chosen.num_closures,
-        "value": float(values[choice.action]),
+        "value": float(values[choice.index]),
         "best_value": float(values.min()),
         "spread": spread,
         "loss": loss,
         "action_consistent": loss <= TIE,
-        "signature": None if choice.scores is None else float(choice.scores[choice.action]),
-        "lower": choice.lower,
-        "upper": choice.upper,
-        "error_bound": choice.error_bound,
-        "num_survivors": choice.num_survivors,
-        "num_evaluations": choice.num_evaluations,
-        "proven_optimal": choice.proven_optimal,
+        "signature": None if reasons.scores is None else float(reasons.scores[choice.index]),
+        "lower": reasons.lower,
+        "upper": reasons.upper,
+        "error_bound": reasons.error_bound,
+        "num_survivors": reasons.num_survivors,
+        "num_evaluations": reasons.num_evaluations,
+        "proven_optimal": reasons.proven_optimal,
         **_quality_columns(quality, spread),
         "candidate_lengths": lengths.tolist(),
         "candidate_values": values.tolist(),
-        "candidate_scores": None if choice.scores is None else choice.scores.tolist(),
+        "candidate_scores": None if reasons.scores is None else reasons.scores.tolist(),
         "version": version("topobelief"),
         "candidates_seconds": seconds + spent,
         "decision_seconds": choice.seconds,
@@ -118,32 +117,21 @@ def _quality_columns(quality: DecisionQuality | None, spread: float) -> Row:
     }
 
 
-def _candidates(task: Task, graph: PoseGraph, number: int) -> tuple[FloatArray, list[Action], float]:
-    """Lengths of the candidate paths to a goal, the actions along them, and the seconds that both took."""
-    paths, seconds = _paths(_Leg(task.place, number, task.seed, task))
-    begin, rule = time.perf_counter(), task.rule
-    actions = predict_actions(
-        graph,
-        paths,
-        information=task.noise.information,
-        spacing=rule.spacing,
-        closure_radius=rule.closure_radius,
-        closure_angle=rule.closure_angle,
-        min_index_gap=rule.min_index_gap,
-        world=task.world if rule.line_of_sight else None,
-    )
-    return np.array([path_length(path) for path in paths]), actions, seconds + time.perf_counter() - begin
+def _candidates(task: Task, graph: PoseGraph, number: int) -> tuple[Candidates, float]:
+    """Candidates for a goal, and the seconds that finding them took."""
+    routes, seconds = _routes(_Leg(task.place, number, task.seed, task))
+    begin = time.perf_counter()
+    rule = replace(task.rule.candidates, information=task.noise.information)
+    found = predict_candidates(graph, task.world, routes, rule)
+    return found, seconds + time.perf_counter() - begin
 
 
 @lru_cache(maxsize=16)
-def _paths(leg: _Leg) -> tuple[Sequence[FloatArray], float]:
-    """Paths of a leg and the seconds they took; neighbouring tasks differ in what comes after them alone."""
+def _routes(leg: _Leg) -> tuple[Routes, float]:
+    """Ways of a leg and the seconds they took; neighbouring tasks differ in what comes after them alone."""
     begin = time.perf_counter()
-    task, number, rule = leg.task, leg.number, leg.task.rule
+    task, number = leg.task, leg.number
     session = task.session
     start = session.graph.positions[-1] if number == 0 else session.goals[number - 1]
-    goal = session.goals[number]
-    max_detour = rule.max_detour if np.isfinite(rule.max_detour) else None
-    roadmap = build_roadmap(task.world, start, goal, rule.num_vertices, rule.robot_radius, task.seed)
-    paths = diverse_paths(roadmap, start, goal, session.num_paths[number], max_detour, task.seed)
-    return paths, time.perf_counter() - begin
+    rule = replace(task.rule.candidates, num_paths=session.num_paths[number], seed=task.seed)
+    return find_routes(task.world, start, session.goals[number], rule), time.perf_counter() - begin

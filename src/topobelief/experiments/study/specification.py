@@ -7,17 +7,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import TypeVar, cast, get_args
+from typing import Any, TypeVar, cast, get_args
 
 import numpy as np
 
 from topobelief.arrays import FloatArray
 from topobelief.bounds.entropy_bounds import Determinant
+from topobelief.candidates.propose import CandidateRule
 from topobelief.errors import FileError
 from topobelief.estimation import optimize
-from topobelief.experiments.study.strategies import STRATEGIES
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.files import StrPath
 from topobelief.io.floor_plan import read_world
@@ -25,10 +25,13 @@ from topobelief.io.formats import read_pose_graph
 from topobelief.io.ros_map import Unknown
 from topobelief.io.yaml_fields import Field, read_fields
 from topobelief.planning.registry import AUTO, BOUNDS, OBJECTIVES
+from topobelief.strategies.registry import STRATEGIES
 from topobelief.world import World
 
 _Entry = TypeVar("_Entry")
 _NO_LIMIT = ("none", "inf", ".inf")
+_VARIED = ("num_paths", "seed", "information")  # by session, seed and noise
+_CANDIDATE_KEYS = tuple(field.name for field in fields(CandidateRule) if field.name not in _VARIED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,18 +54,27 @@ class Noise:
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """How candidates are found, their factors predicted and their entropies bounded; as `topobelief plan` has them."""
+    """How candidates are found, their factors predicted and their entropies bounded; as `topobelief plan` has them.
 
-    num_vertices: int = 1000
-    robot_radius: float = 0.35  # metres
-    max_detour: float = 1.3  # in lengths of the shortest path; inf for no limit
-    spacing: float = 1.0  # metres
-    closure_radius: float = 2.0  # metres
-    closure_angle: float = math.pi
-    min_index_gap: int = 5
-    line_of_sight: bool = True
+    Attributes
+    ----------
+    candidates
+        But for what the tasks vary: number of paths, seed and noise.
+    bounds, determinant
+        As the planner takes them.
+    """
+
+    candidates: CandidateRule = field(default_factory=CandidateRule)
     bounds: str = "fischer"
     determinant: Determinant = "cholesky"
+
+    @property
+    def content(self) -> dict[str, object]:
+        """All of it by the keys of the YAML file; inf where detours have no limit."""
+        rule = self.candidates
+        detour = math.inf if rule.max_detour is None else rule.max_detour
+        values = {key: getattr(rule, key) for key in _CANDIDATE_KEYS}
+        return {**values, "max_detour": detour, "bounds": self.bounds, "determinant": self.determinant}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -221,7 +233,6 @@ def _seeds(field: Field) -> tuple[int, ...]:
 
 
 def _rule(field: Field) -> Rule:
-    keys = field.mapping(optional=Rule.__dataclass_fields__)
     readers: dict[str, Callable[[Field], object]] = {
         "num_vertices": lambda item: item.whole(at_least=2),
         "robot_radius": lambda item: item.number(above=0),
@@ -234,12 +245,14 @@ def _rule(field: Field) -> Rule:
         "bounds": lambda item: item.choice((*BOUNDS, AUTO)),
         "determinant": lambda item: item.choice(get_args(Determinant)),
     }
-    values = {key: readers[key](child) for key, child in keys.items()}
-    return Rule(**values)  # pyright: ignore[reportArgumentType]  (each reader gives its field's type)
+    values = {key: readers[key](child) for key, child in field.mapping(optional=readers).items()}
+    of_candidates: dict[str, Any] = {key: value for key, value in values.items() if key in _CANDIDATE_KEYS}
+    others: dict[str, Any] = {key: value for key, value in values.items() if key not in _CANDIDATE_KEYS}
+    return Rule(CandidateRule(**of_candidates), **others)
 
 
-def _detour(field: Field) -> float:
+def _detour(field: Field) -> float | None:
     expected = "a number of at least 1, or none for no limit"
     if field.text(expected=expected).lower() in _NO_LIMIT:
-        return math.inf
+        return None
     return field.number(at_least=1)

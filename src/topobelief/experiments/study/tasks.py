@@ -74,7 +74,7 @@ def _of_seed(specification: Specification, seed: int) -> Iterator[Task]:
     for session, names in specification.sessions:
         for name in names:
             world = specification.worlds[name]
-            place = _digest(_world_digest(world), _session_content(session), asdict(rule))
+            place = _digest(_world_digest(world), _session_content(session), rule.content)
             for noise in specification.noises:
                 for objective in specification.objectives:
                     for strategy in specification.strategies:

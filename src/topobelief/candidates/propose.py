@@ -1,0 +1,160 @@
+"""From a place to candidates: a roadmap, diverse paths on it, and the factors that each would add to the graph.
+
+Commands, studies and simulations all find their candidates here, so a new rule has one place. `propose` does it in one step;
+its two halves, `find_routes` and `predict_candidates`, are for callers that keep the paths while the noise changes, or that
+report between the two.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from topobelief.arrays import FloatArray
+from topobelief.candidates.diverse_paths import diverse_paths
+from topobelief.candidates.polyline import path_length
+from topobelief.candidates.predicted_factors import predict_actions
+from topobelief.candidates.roadmap import Roadmap, build_roadmap
+from topobelief.candidates.start import Start
+from topobelief.graph.action import Action
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.world import World
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class CandidateRule:
+    """How candidates are found and their factors predicted.
+
+    Attributes
+    ----------
+    num_paths
+        How many at most.
+    max_detour
+        Longest path in lengths of the shortest, at least 1; None for no limit.
+    num_vertices
+        Least size of the roadmap.
+    robot_radius
+        How far paths keep from walls, metres.
+    seed
+        Of roadmap and paths.
+    spacing
+        Metres from new pose to new pose.
+    closure_radius, closure_angle, min_index_gap
+        Loops close between poses nearer than this (metres), turned by at most this (radians), and so many steps apart.
+    line_of_sight
+        Whether loops close only between poses that see each other, and paths must stay in free space.
+    information : shape (3, 3), or None
+        Of every predicted factor; None for what the graph suggests (`predicted_factors.default_information`).
+    """
+
+    num_paths: int = 20
+    max_detour: float | None = 1.3
+    num_vertices: int = 1000
+    robot_radius: float = 0.35
+    seed: int = 0
+    spacing: float = 1.0
+    closure_radius: float = 2.0
+    closure_angle: float = math.pi
+    min_index_gap: int = 5
+    line_of_sight: bool = True
+    information: FloatArray | None = None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Routes:
+    """Ways to a goal.
+
+    Attributes
+    ----------
+    roadmap
+        On which the paths were found.
+    paths
+        K polylines, each of shape (waypoints, 2), metres, shortest first.
+    """
+
+    roadmap: Roadmap
+    paths: list[FloatArray]
+
+    @property
+    def lengths(self) -> FloatArray:
+        """Of the paths, metres, shape (K,)."""
+        return np.array([path_length(path) for path in self.paths])
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Candidates:
+    """Ways to a goal, and what driving each would add to the graph.
+
+    Attributes
+    ----------
+    routes
+    actions
+        K, in the order of the paths.
+    """
+
+    routes: Routes
+    actions: list[Action]
+
+    @property
+    def paths(self) -> list[FloatArray]:
+        """K polylines, each of shape (waypoints, 2), metres, shortest first."""
+        return self.routes.paths
+
+    @property
+    def lengths(self) -> FloatArray:
+        """Of the paths, metres, shape (K,)."""
+        return self.routes.lengths
+
+
+def propose(graph: PoseGraph, world: World, start: ArrayLike | Start, goal: ArrayLike, rule: CandidateRule) -> Candidates:
+    """Diverse paths from a start to a goal, and the factors that each would add.
+
+    Parameters
+    ----------
+    graph
+        In SE(2).
+    world
+    start
+        Where paths begin. From a `Start`, factors join its pose, as `predict_actions` says. From a place of shape (2,) or (3,),
+        metres, they join the graph's last pose, from which a robot is led straight to where paths begin.
+    goal : shape (2,) or (3,)
+        Metres; a heading is ignored.
+    rule
+
+    Raises
+    ------
+    PlanningError
+        Where start or goal is in collision, there is no path, or a path leaves the free space of the world.
+    InvalidInputError
+        Where a number of the rule is out of range.
+    """
+    routes = find_routes(world, start, goal, rule)
+    return predict_candidates(graph, world, routes, rule, start=start if isinstance(start, Start) else None)
+
+
+def find_routes(world: World, start: ArrayLike | Start, goal: ArrayLike, rule: CandidateRule) -> Routes:
+    """The paths of `propose`, which depend on the world alone."""
+    place = start.place if isinstance(start, Start) else start
+    roadmap = build_roadmap(world, place, goal, rule.num_vertices, rule.robot_radius, rule.seed)
+    return Routes(roadmap, diverse_paths(roadmap, place, goal, rule.num_paths, rule.max_detour, rule.seed))
+
+
+def predict_candidates(
+    graph: PoseGraph, world: World, routes: Routes, rule: CandidateRule, *, start: Start | None = None
+) -> Candidates:
+    """The factors of `propose` along paths that were found before; they join the last pose unless there is a start."""
+    actions = predict_actions(
+        graph,
+        routes.paths,
+        information=rule.information,
+        spacing=rule.spacing,
+        closure_radius=rule.closure_radius,
+        closure_angle=rule.closure_angle,
+        min_index_gap=rule.min_index_gap,
+        world=world if rule.line_of_sight else None,
+        start=start,
+    )
+    return Candidates(routes, actions)

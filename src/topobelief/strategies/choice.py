@@ -1,0 +1,93 @@
+"""What a strategy answers: the chosen candidate, the seconds that took, and the reasons."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from topobelief.arrays import FloatArray
+from topobelief.planning.decision import Decision
+from topobelief.strategies.question import Question
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Reasons:
+    """What a strategy knows about its choice.
+
+    Attributes
+    ----------
+    decision : Decision or None
+        With ranking, bounds and certificate, where the strategy is one of the planner's.
+    scores : shape (K,), or None
+        What it ranks the candidates by, the larger, the better; None where it seeks the best alone.
+    lower, upper : float or None
+        Bounds of the objective of the chosen candidate, where the strategy computes any.
+    error_bound : float or None
+        No candidate is better than the chosen one by more than this, nats.
+    num_survivors : int or None
+        Candidates that the bounds do not rule out.
+    num_evaluations : int
+        Exact entropies computed.
+    proven_optimal : bool
+    """
+
+    decision: Decision | None = None
+    scores: FloatArray | None = None
+    lower: float | None = None
+    upper: float | None = None
+    error_bound: float | None = None
+    num_survivors: int | None = None
+    num_evaluations: int = 0
+    proven_optimal: bool = False
+
+    @classmethod
+    def of(cls, decision: Decision, *, scores: FloatArray | None = None) -> Reasons:
+        """Those that a decision of the planner gives."""
+        return cls(
+            decision=decision,
+            scores=scores,
+            lower=float(decision.lower[decision.best]),
+            upper=float(decision.upper[decision.best]),
+            error_bound=decision.error_bound,
+            num_survivors=len(decision.survivors),
+            num_evaluations=decision.num_evaluations,
+            proven_optimal=decision.proven_optimal,
+        )
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Choice:
+    """The answer of a strategy.
+
+    Attributes
+    ----------
+    index : int
+        Of the chosen candidate.
+    seconds : float
+        Wall time from the question to the index. It includes building the planner (factoring the prior), signatures, and the
+        bounds and exact entropies without which the strategy cannot name an index. It excludes what is computed afterwards to
+        say how good the choice is (the bounds behind a ranking by signature), finding the candidates, and compiling kernels.
+    reasons : Reasons
+    """
+
+    index: int
+    seconds: float
+    reasons: Reasons
+
+    @property
+    def decision(self) -> Decision | None:
+        """That of the planner, where the strategy is one of its own."""
+        return self.reasons.decision
+
+
+Answer = tuple[int, Callable[[], Reasons]]
+"""The index of the chosen candidate, and what computes the reasons, which the seconds of a choice do not include."""
+
+
+class Strategy(Protocol):
+    """A way to choose."""
+
+    def __call__(self, name: str, question: Question) -> Answer:
+        """The answer to a question, asked by the name under which the strategy is registered."""
+        ...

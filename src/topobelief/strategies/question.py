@@ -1,0 +1,56 @@
+"""A decision to make, as every strategy gets it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from importlib.util import find_spec
+
+from topobelief.arrays import FloatArray
+from topobelief.bounds.entropy_bounds import Determinant
+from topobelief.graph.action import Action
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.planning.planner import Planner
+
+
+def installed_bounds() -> str:
+    """Bounds anchored in the prior where numba is installed, which compiles them; Fischer's otherwise."""
+    return "fischer" if find_spec("numba") is None else "anchored"
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Question:
+    """A decision to make.
+
+    Attributes
+    ----------
+    graph
+        At its estimate.
+    actions
+        K of them.
+    lengths : shape (K,)
+        Of the paths, metres.
+    random_scores : shape (K,)
+        Random numbers drawn by whoever asks; "random" takes the action with the largest. So strategies draw nothing themselves.
+    objective, bounds, determinant
+        As the planner takes them. Default of the bounds: `installed_bounds`.
+    """
+
+    graph: PoseGraph
+    actions: Sequence[Action]
+    lengths: FloatArray
+    random_scores: FloatArray
+    objective: str
+    bounds: str = field(default_factory=installed_bounds)
+    determinant: Determinant = "cholesky"
+
+    def planner(self, signature: str = "spanning_trees") -> Planner:
+        """For this question; dense spectra are allowed, since whoever asks named the strategy."""
+        return Planner(
+            self.graph,
+            objective=self.objective,
+            signature=signature,
+            bounds=self.bounds,
+            determinant=self.determinant,
+            allow_dense_spectrum=True,
+        )

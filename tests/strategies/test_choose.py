@@ -1,0 +1,151 @@
+"""Strategies choose what they say they choose."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from topobelief.candidates.polyline import path_length
+from topobelief.candidates.predicted_factors import predict_actions
+from topobelief.errors import InvalidInputError
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.planning.planner import Planner
+from topobelief.planning.registry import SIGNATURES, imported
+from topobelief.strategies import choose as choose_module
+from topobelief.strategies.choice import Reasons
+from topobelief.strategies.choose import choose
+from topobelief.strategies.question import Question
+from topobelief.strategies.registry import STRATEGIES, checked_strategy
+
+INFORMATION = np.diag([100.0, 100.0, 800.0])
+
+
+@pytest.fixture(scope="module")
+def question():
+    """A drive out, and three ways to a place beside it: straight, along the drive, and far around."""
+    poses = [(float(x), 0.0, 0.0) for x in range(11)]
+    graph = PoseGraph(poses, [(i, i + 1) for i in range(10)], None, INFORMATION)
+    paths = [
+        np.array([(10, 0), (10, 5), (1, 5), (1, 1.5)], dtype=float),
+        np.array([(10, 0), (9, 1), (1, 1), (1, 1.5)], dtype=float),
+        np.array([(10, 0), (10, 9), (1, 9), (1, 1.5)], dtype=float),
+    ]
+    actions = predict_actions(graph, paths)
+    return graph, actions, np.array([path_length(path) for path in paths])
+
+
+def chosen(question, strategy, *, objective="joint", seed=0):
+    return choose(strategy, Question(*question, np.random.default_rng(seed).random(3), objective))
+
+
+@pytest.mark.parametrize("objective", ["joint", "map", "per_pose"])
+def test_those_that_evaluate_find_the_least_objective(question, objective):
+    graph, actions, _ = question
+    best = int(np.argmin(Planner(graph, objective=objective).entropies(actions)))
+    assert chosen(question, "standard", objective=objective).index == best
+    optimum = chosen(question, "optimum", objective=objective)
+    assert optimum.index == best
+    assert optimum.decision.proven_optimal
+    assert optimum.reasons.proven_optimal
+    assert optimum.reasons.scores is None
+
+
+@pytest.mark.parametrize("objective", ["joint", "map", "per_pose"])
+def test_reasons_hold(question, objective):
+    """The bounds of a choice contain its objective, and no candidate is better by more than the error bound."""
+    graph, actions, _ = question
+    values = Planner(graph, objective=objective).entropies(actions)
+    with_reasons = [*SIGNATURES, "optimum", "standard"]
+    for strategy in STRATEGIES:
+        choice = chosen(question, strategy, objective=objective)
+        reasons, value = choice.reasons, values[choice.index]
+        if strategy in with_reasons:
+            assert reasons.lower - 1e-9 <= value <= reasons.upper + 1e-9
+            assert value - values.min() <= reasons.error_bound + 1e-9
+        else:
+            assert (reasons.lower, reasons.error_bound, reasons.num_evaluations) == (None, None, 0)
+    assert chosen(question, "standard", objective=objective).reasons.num_evaluations == len(actions)
+
+
+@pytest.mark.parametrize("strategy", ["shortest", "random", *SIGNATURES])
+def test_the_largest_score_is_chosen(question, strategy):
+    choice = chosen(question, strategy)
+    assert choice.index == int(np.argmax(choice.reasons.scores))
+
+
+@pytest.mark.parametrize("strategy", [*STRATEGIES, "path-2"])
+def test_seconds_end_with_the_answer(question, strategy, monkeypatch):
+    """The clock runs from the question to the index for every strategy alike; the reasons are worked out after it stops."""
+    events = []
+
+    class Clock:
+        @staticmethod
+        def perf_counter():
+            events.append("clock")
+            return float(len(events))
+
+    def timed(place):
+        function = load(place)
+
+        def strategy_seen(name, question):
+            index, reasons = function(name, question)
+            events.append("answer")
+
+            def reasons_seen():
+                events.append("reasons")
+                return reasons()
+
+            return index, reasons_seen
+
+        return strategy_seen
+
+    load = choose_module.imported
+    monkeypatch.setattr(choose_module, "time", Clock)
+    monkeypatch.setattr(choose_module, "imported", timed)
+    choice = chosen(question, strategy)
+    assert events == ["clock", "answer", "clock", "reasons"]
+    assert choice.seconds == 2.0
+
+
+def test_a_ranking_computes_bounds_only_as_reasons(question, monkeypatch):
+    proofs = []
+    decide = Planner.decide
+
+    def seen(self, actions, *, proof="bounded", **options):
+        proofs.append(proof)
+        return decide(self, actions, proof=proof, **options)
+
+    monkeypatch.setattr(Planner, "decide", seen)
+    _, reasons = imported(STRATEGIES["spanning_trees"])("spanning_trees", Question(*question, np.zeros(3), "joint"))
+    assert proofs == ["none"]
+    assert isinstance(reasons(), Reasons)
+    assert proofs == ["none", "bounded"]
+
+
+@pytest.mark.parametrize("signature", ["spanning_trees", "von_neumann", "von_neumann_approx"])
+def test_a_signature_takes_the_first_of_its_ranking(question, signature):
+    choice = chosen(question, signature)
+    assert choice.index == choice.decision.ranking[0]
+    assert choice.decision.signature == signature
+    assert np.isfinite(choice.decision.error_bound)
+
+
+def test_lengths_alone(question):
+    lengths = question[2]
+    order = np.argsort(lengths).tolist()
+    assert chosen(question, "shortest").index == order[0]
+    assert [chosen(question, f"path-{k}").index for k in (1, 2, 3, 4)] == [*order, order[-1]]
+    assert chosen(question, "shortest").decision is None
+
+
+def test_random_draws_all_of_them_and_repeats_itself(question):
+    draws = [chosen(question, "random", seed=seed).index for seed in range(30)]
+    assert set(draws) == {0, 1, 2}
+    assert draws == [chosen(question, "random", seed=seed).index for seed in range(30)]
+
+
+def test_unknown_strategies_are_refused():
+    assert [checked_strategy(name) for name in STRATEGIES] == list(STRATEGIES)
+    for name in ("spanning", "path-0", "path-", "path-1x"):
+        with pytest.raises(InvalidInputError, match="spanning_trees"):
+            checked_strategy(name)
