@@ -114,6 +114,31 @@ def polygons(shape: Shape) -> list[Polygon]:
     return [part for part in _shapely.get_parts(shape) if isinstance(part, Polygon) and part.area > 0]
 
 
+def triangles(polygon: Polygon) -> FloatArray:
+    """Triangles with the polygon's own corners that make it up (a constrained Delaunay triangulation), shape (T, 3, 2)."""
+    pieces = _shapely.get_parts(_shapely.constrained_delaunay_triangles(polygon))
+    return _shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3]
+
+
+def simplified(polygon: Polygon, tolerance: float) -> Polygon:
+    """The polygon with fewer of its corners, its outline off by no more than about a tolerance, and as many holes."""
+    return _shapely.simplify(polygon, tolerance, preserve_topology=True)
+
+
+def corners(polygon: Polygon) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Each corner of a polygon, the one before and the one after it, the interior on the left; shapes (N, 2)."""
+    corners, first, ring = _boundary_segments(_shapely.orient_polygons(polygon))
+    before = first - 1
+    starts_ring = np.r_[True, np.diff(ring) != 0]
+    before[starts_ring] = first[np.r_[starts_ring[1:], True]]
+    return corners[first], corners[before], corners[first + 1]
+
+
+def intersection(shape: Shape, other: Shape) -> Shape:
+    """What two shapes have in common."""
+    return _shapely.intersection(shape, other)
+
+
 def holes(polygon: Polygon) -> ShapeArray:
     """The holes of a polygon, each filled."""
     return _shapely.polygons(_shapely.get_rings(polygon)[1:])
