@@ -37,7 +37,7 @@ class Corners(NamedTuple):
     beside: FloatArray
 
 
-def find_corners(world: World, region: Polygon, robot_radius: float, max_corners: int) -> Corners:
+def find_corners(world: World, region: Polygon, ends: FloatArray, robot_radius: float, max_corners: int) -> Corners:
     """Places to bend around all obstacles within reach.
 
     Parameters
@@ -45,20 +45,20 @@ def find_corners(world: World, region: Polygon, robot_radius: float, max_corners
     world
     region
         What the robot's centre can reach, see `World.component`.
+    ends : shape (2, 2)
+        Start and goal.
     robot_radius
         Metres.
     max_corners
-        The outline is simplified until it has no more.
+        Where there are more, those are kept by way of which it is nearest, straight, from start to goal.
     """
     tolerance = _TOLERANCE * robot_radius
-    while True:
-        outline, before, after = shapes.corners(shapes.simplified(region, tolerance))
-        arriving, leaving = _directions(outline - before), _directions(after - outline)
-        convex = _cross(arriving, leaving) < 0  # the region is on the left
-        if np.count_nonzero(convex) <= max_corners:
-            break
-        tolerance *= 2
-    outline, before, after, arriving, leaving = (each[convex] for each in (outline, before, after, arriving, leaving))
+    outline, before, after = shapes.corners(region, tolerance)
+    arriving, leaving = _directions(outline - before), _directions(after - outline)
+    by_way = np.linalg.norm(outline[:, None] - ends, axis=2).sum(axis=1)
+    convex = np.flatnonzero(_cross(arriving, leaving) < 0)  # the region is on the left
+    kept = np.sort(convex[np.argsort(by_way[convex], kind="stable")[:max_corners]])
+    outline, before, after, arriving, leaving = (each[kept] for each in (outline, before, after, arriving, leaving))
     half_turn = np.arccos(np.clip((arriving * leaving).sum(axis=1), -1, 1)) / 2
     off = (tolerance + _CLEAR * robot_radius) / np.cos(np.minimum(half_turn, _SHARPEST))  # moves the sides by the former
     away = _directions(arriving + leaving) @ np.array([[0, 1], [-1, 0]])

@@ -96,7 +96,7 @@ class Roadmap:
         if blocked is not None:
             weights = np.where(blocked[edge], np.inf, matrix.data)
             matrix = sparse.csr_array((weights, matrix.indices, matrix.indptr), shape=matrix.shape)
-        limit = min(max_length, float(self.lengths.sum()))  # finite, so that a blocked edge is never taken
+        limit = min(max_length, 2 * float(self.lengths.sum()))  # finite, so that a blocked edge is never taken; sums are rounded
         _, previous = _dijkstra(matrix, indices=source, limit=limit, return_predecessors=True)
         path = [target]
         while path[-1] != source:
@@ -176,11 +176,12 @@ def build_roadmap(
     if region.distance(shapes.point(ends[1])) > _SAME_PLACE:
         raise PlanningError(_unreachable(world, ends, robot_radius))
     places, links = find_passages(world, region, ends, robot_radius)
-    corners = find_corners(world, region, robot_radius, _CORNERS_PER_VERTEX * num_vertices)
+    corners = find_corners(world, region, ends, robot_radius, _CORNERS_PER_VERTEX * num_vertices)
     draws = max(num_vertices - len(places) - len(corners.places), num_vertices // 2)
     drawn = _random_places(world, region, ends, draws, robot_radius, rng=np.random.default_rng(seed))
     spread = np.concatenate([places, drawn])
-    edges = np.concatenate([links, _free_edges(world, spread, robot_radius)])
+    unlinked = np.r_[0, 1, np.arange(len(places), len(spread))]
+    edges = np.concatenate([links, _free_edges(world, spread, robot_radius, of=unlinked)])
     vertices = np.concatenate([spread, corners.places])
     roadmap = Roadmap(world, float(robot_radius), region, vertices, _each_once(edges))
     # corners, and places where these have no room
@@ -284,13 +285,12 @@ def _uniform(triangles: FloatArray, count: int, *, rng: np.random.Generator) -> 
     return a[chosen] + shares[0] * (b - a)[chosen] + shares[1] * (c - a)[chosen]
 
 
-def _free_edges(world: World, vertices: FloatArray, robot_radius: float, *, of: IntArray | None = None) -> IntArray:
-    """Free edges from each vertex (or from those in `of`) to its nearest ones, each once; shape (E, 2)."""
-    sources = np.arange(len(vertices)) if of is None else of
+def _free_edges(world: World, vertices: FloatArray, robot_radius: float, *, of: IntArray) -> IntArray:
+    """Free edges from some vertices, shape (N,), to their nearest ones, each once; shape (E, 2)."""
     num_neighbours = math.ceil(1.5 * math.e * math.log(len(vertices)))  # k of PRM*, d = 2
     num_neighbours = min(num_neighbours, len(vertices) - 1)
-    _, neighbours = KDTree(vertices).query(vertices[sources], k=num_neighbours + 1)  # itself among them
-    pairs = np.stack([np.repeat(sources, num_neighbours + 1), np.ravel(neighbours)], axis=1)
+    _, neighbours = KDTree(vertices).query(vertices[of], k=num_neighbours + 1)  # itself among them
+    pairs = np.stack([np.repeat(of, num_neighbours + 1), np.ravel(neighbours)], axis=1)
     pairs = np.unique(np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1), axis=0)
     free = world.segments_free(vertices[pairs[:, 0]], vertices[pairs[:, 1]], robot_radius)
     return pairs[free]

@@ -120,16 +120,16 @@ def triangles(polygon: Polygon) -> FloatArray:
     return _shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3]
 
 
-def simplified(polygon: Polygon, tolerance: float) -> Polygon:
-    """The polygon with fewer of its corners, its outline off by no more than about a tolerance, and as many holes."""
-    return _shapely.simplify(polygon, tolerance, preserve_topology=True)
+def corners(polygon: Polygon, tolerance: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Corners of a polygon, each with the one before and the one after it, the interior on the left; shapes (N, 2).
 
-
-def corners(polygon: Polygon) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Each corner of a polygon, the one before and the one after it, the interior on the left; shapes (N, 2)."""
-    corners, first, ring = _boundary_segments(_shapely.orient_polygons(polygon))
+    Those are left out without which the outline is off by no more than about a tolerance. Each ring is taken by itself.
+    """
+    rings = _shapely.get_rings(_shapely.orient_polygons(polygon))
+    corners, ring = _shapely.get_coordinates(_shapely.simplify(rings, tolerance), return_index=True)
+    first = np.flatnonzero(ring[1:] == ring[:-1])
+    starts_ring = np.r_[True, np.diff(ring[first]) != 0]
     before = first - 1
-    starts_ring = np.r_[True, np.diff(ring) != 0]
     before[starts_ring] = first[np.r_[starts_ring[1:], True]]
     return corners[first], corners[before], corners[first + 1]
 
