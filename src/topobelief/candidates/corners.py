@@ -91,7 +91,7 @@ def tangents(world: World, corners: Corners, robot_radius: float, nearest: range
         sides = [_cross(along, beside[end, which] - places[end]) for which in (0, 1)]
         touching &= sides[0] * sides[1] >= 0
     pairs = pairs[touching]
-    return pairs[world.segments_free(*places[pairs].transpose(1, 0, 2), robot_radius)]
+    return pairs[world.segments_free(places[pairs[:, 0]], places[pairs[:, 1]], robot_radius)]
 
 
 def _directions(vectors: FloatArray) -> FloatArray:

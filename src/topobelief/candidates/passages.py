@@ -63,7 +63,8 @@ def find_passages(world: World, region: Polygon, ends: FloatArray, robot_radius:
     while len(low):
         pairs = np.stack([gates[low], gates[high]], axis=1)
         straight = _crosses_all(first[gates], second[gates], middle[gates], low, high)
-        straight[straight] = world.segments_free(*middle[pairs[straight]].transpose(1, 0, 2), robot_radius)
+        a, b = pairs[straight].T
+        straight[straight] = world.segments_free(middle[a], middle[b], robot_radius)
         links.append(pairs[straight])
         halved = ~straight & (high - low > 1)
         low, high = low[halved], high[halved]
@@ -124,7 +125,7 @@ class _Mesh:
         return cls(gates, beside, [_holder(triangles, end) for end in ends])
 
     @cached_property
-    def _neighbours(self) -> list[dict[int, int]]:
+    def _neighbours(self) -> defaultdict[int, dict[int, int]]:
         """By triangle: its gates and the triangle behind each, without those that lead into dead ends."""
         neighbours: defaultdict[int, dict[int, int]] = defaultdict(dict)
         for gate, (a, b) in enumerate(self.beside.tolist(), start=2):
@@ -146,7 +147,7 @@ class _Mesh:
         ways_out: defaultdict[int, list[tuple[int, list[int]]]] = defaultdict(list)  # by junction: passage, gates up to it
         for end, home in enumerate(homes):
             ways_out[home].append((end, [end]))
-        widths = np.linalg.norm(self.gates[:, 1] - self.gates[:, 0], axis=1)
+        widths: list[float] = np.linalg.norm(self.gates[:, 1] - self.gates[:, 0], axis=1).tolist()
         for junction, ways in list(neighbours.items()):
             if len(ways) < 3 and junction not in homes:
                 continue

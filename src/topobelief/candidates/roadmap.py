@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import KDTree
-from shapely import Polygon, box
+from shapely import Polygon
 
 from topobelief.arrays import BoolArray, FloatArray, IntArray, frozen_floats
 from topobelief.candidates.corners import Corners, find_corners, tangents
@@ -97,7 +97,9 @@ class Roadmap:
         if blocked is not None:
             weights = np.where(blocked[edge], np.inf, matrix.data)
             matrix = sparse.csr_array((weights, matrix.indices, matrix.indptr), shape=matrix.shape)
-        limit = min(max_length, 2 * float(self.lengths.sum()))  # finite, so that a blocked edge is never taken; sums are rounded
+        limit = min(
+            max_length, 2 * float(self.lengths.sum())
+        )  # finite, so that a blocked edge is never taken; sums are rounded
         _, previous = _dijkstra(matrix, indices=source, limit=limit, return_predecessors=True)
         path = [target]
         while path[-1] != source:
@@ -270,7 +272,7 @@ def _random_places(
     Half of them are uniform over the region, half over what lies around start and goal, up to their distance away.
     """
     margin = np.linalg.norm(ends[1] - ends[0])
-    around = shapes.intersection(region, box(*(ends.min(axis=0) - margin), *(ends.max(axis=0) + margin)))
+    around = shapes.within(region, np.concatenate([ends.min(axis=0) - margin, ends.max(axis=0) + margin]))
     shares: list[FloatArray] = []
     for size, part in ((count // 2, region), (count - count // 2, around)):
         triangles = np.concatenate([shapes.triangles(polygon) for polygon in shapes.polygons(part)])

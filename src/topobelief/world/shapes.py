@@ -134,19 +134,14 @@ def corners(polygon: Polygon, tolerance: float) -> tuple[FloatArray, FloatArray,
     return corners[first], corners[before], corners[first + 1]
 
 
-def intersection(shape: Shape, other: Shape) -> Shape:
-    """What two shapes have in common."""
-    return _shapely.intersection(shape, other)
+def within(shape: Shape, corners: FloatArray) -> Shape:
+    """The part of a shape in the rectangle x_min, y_min, x_max, y_max."""
+    return _shapely.intersection(shape, _shapely.box(*corners))
 
 
 def holes(polygon: Polygon) -> ShapeArray:
     """The holes of a polygon, each filled."""
     return _shapely.polygons(_shapely.get_rings(polygon)[1:])
-
-
-def outline(shape: Shape, spacing: float) -> FloatArray:
-    """Corners of a shape, each once, and points between them at most `spacing` apart; shape (N, 2)."""
-    return np.unique(_shapely.get_coordinates(_shapely.segmentize(shape, spacing)), axis=0)
 
 
 def extent(shapes: Shape | ShapeArray) -> FloatArray:
