@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
 
 import networkx as nx
@@ -11,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from data_files import map_file
+from topobelief.candidates.polyline import path_length
 from topobelief.candidates.roadmap import Roadmap, build_roadmap
 from topobelief.errors import InvalidInputError, PlanningError
 from topobelief.io.floor_plan import read_walls
@@ -87,19 +89,63 @@ class TestRoadmap:
             assert roadmap.shortest_path(blocked=blocked, max_length=0.999 * expected) is None
         assert roadmap.shortest_path(blocked=np.ones(len(roadmap.edges), dtype=bool)) is None
 
-    def test_grows_until_start_and_goal_connect(self) -> None:
-        """A few vertices do not get around a maze; the roadmap says so by its size."""
+    def test_may_be_of_no_more_edges_than_its_shortest_path(self, world: World) -> None:
+        """Whose length is their sum, added in another order."""
+        rng = np.random.default_rng(0)
+        edges = np.array([(0, 2), (1, 99), *((i, i + 1) for i in range(2, 99))])
+        for _ in range(20):
+            x = np.sort(rng.uniform(0, 10, 100))
+            vertices = np.stack([np.r_[x[0], x[-1], x[1:-1]], np.zeros(100)], axis=1)
+            path = Roadmap(world, RADIUS, world.component(START, RADIUS), vertices, edges).shortest_path()
+            assert path is not None
+            assert len(path) == 100
+
+    def test_gets_around_a_maze_with_few_vertices(self) -> None:
         walls = [(2 * i, 0, 2 * i + 0.2, 8.5) if i % 2 else (2 * i, 1.5, 2 * i + 0.2, 10) for i in range(1, 10)]
-        maze = World.from_boxes(walls, (0, 0, 20, 10))
-        roadmap = build_roadmap(maze, (1, 5), (19, 5), num_vertices=50)
-        assert roadmap.shortest_path() is not None
-        assert len(roadmap.vertices) > 50
+        roadmap = build_roadmap(World.from_boxes(walls, (0, 0, 20, 10)), (1, 5), (19, 5), num_vertices=2)
+        path = roadmap.shortest_path()
+        assert path is not None
+        assert roadmap.lengths.sum() > 60
+        assert len(roadmap.vertices) < 200
 
     @pytest.mark.parametrize("width", [0.702, 0.72, 0.8])
     def test_finds_doors_that_leave_millimetres(self, width: float) -> None:
         world = World.from_boxes([(20, 0, 20.2, 10 - width / 2), (20, 10 + width / 2, 20.2, 20)], (0, 0, 40, 20))
         for seed in range(3):
             assert build_roadmap(world, (2, 2), (38, 18), num_vertices=500, seed=seed).shortest_path() is not None
+
+    @pytest.mark.parametrize("radius", [0.05, 0.25, 0.599])
+    def test_leads_through_both_doors_of_a_large_map_at_every_radius(self, radius: float) -> None:
+        """Two doors 1.2 m wide in a wall 150 m long: with either one closed there is a way through the other."""
+        walls = [(0, 74.8, 60, 75.2), (61.2, 74.8, 90, 75.2), (91.2, 74.8, 150, 75.2)]
+        world = World.from_boxes(walls, (0, 0, 150, 150))
+        for seed in range(2):
+            roadmap = build_roadmap(world, (75, 50), (75, 100), robot_radius=radius, seed=seed)
+            (x_a, y_a), (x_b, y_b) = roadmap.vertices[roadmap.edges].transpose(1, 2, 0)
+            through = (y_a < 75) != (y_b < 75)
+            for closed in (x_a + x_b < 150, x_a + x_b > 150):
+                path = roadmap.shortest_path(blocked=through & closed)
+                assert path is not None
+                assert path_length(roadmap.vertices[path]) < 1.03 * 2 * np.hypot(25, 14.4)
+
+    @pytest.mark.parametrize("radius", [0.15, 0.35])
+    def test_in_a_forest_is_grown_until_its_shortest_path_is_within_1_percent(self, radius: float) -> None:
+        pillars = np.random.default_rng(0).uniform(1.5, 28.5, (150, 2))
+        world = World.from_boxes(np.hstack([pillars - 0.25, pillars + 0.25]), (0, 0, 30, 30))
+        start, goal = (0.7, 0.7), (29.3, 29.3)
+        expected = shortest_by_visibility(world, pillars, 0.25, np.array([start, goal]), radius)
+        for seed in range(2):
+            roadmap = build_roadmap(world, start, goal, num_vertices=300, robot_radius=radius, seed=seed)
+            path = roadmap.shortest_path()
+            assert path is not None
+            assert path_length(roadmap.vertices[path]) < 1.01 * expected
+
+    @pytest.mark.parametrize(("scale", "radius"), [(1.0, 1e-4), (1.0, 1e-7), (1000.0, 0.35)])
+    def test_is_no_larger_for_a_radius_far_below_the_size_of_the_world(self, world: World, scale: float, radius: float) -> None:
+        """As in a map in millimetres with the radius in metres."""
+        scaled = World.from_boxes(scale * BOXES, scale * np.array(BOUNDS))
+        start, goal = scale * np.array(START), scale * np.array(GOAL)
+        assert len(build_roadmap(scaled, start, goal, num_vertices=100, robot_radius=radius).vertices) == 100
 
     def test_takes_another_start_and_goal(self, roadmap: Roadmap) -> None:
         other = roadmap.between((1, 9), (10, 1))
@@ -132,6 +178,28 @@ class TestRoadmap:
                 roadmap = build_roadmap(office, start, goal, seed=seed)
                 assert len(roadmap.vertices) == 1000
                 assert roadmap.shortest_path() is not None
+
+
+def shortest_by_visibility(world: World, pillars: np.ndarray, half: float, ends: np.ndarray, radius: float) -> float:
+    """Length of the shortest path among square pillars for a disc, by all straight ways between points around their corners.
+
+    With 4 points to a corner it is at most 2 % of the radius off at each; points too far for a way 8 % too long are left out.
+    """
+    angles = np.pi / 8 * np.arange(4) + np.pi / 16
+    offset = 1.001 * radius / np.cos(np.pi / 16) * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    signs = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)])
+    around = (pillars[:, None, None] + signs[:, None] * (half + offset)).reshape(-1, 2)
+    detour = np.linalg.norm(around[:, None] - ends, axis=2).sum(axis=1)
+    around = around[detour < 1.08 * np.linalg.norm(ends[1] - ends[0])]
+    places = np.concatenate([ends, around[world.segments_free(around, around, radius)]])
+    a, b = np.triu_indices(len(places), k=1)
+    near = np.linalg.norm(places[b] - places[a], axis=1) < 8
+    a, b = a[near], b[near]
+    free = world.segments_free(places[a], places[b], radius)
+    edges = np.stack([a[free], b[free]], axis=1)
+    path = Roadmap(world, radius, world.component(ends[0], radius), places, edges).shortest_path()
+    assert path is not None
+    return path_length(places[path])
 
 
 @settings(max_examples=10)
@@ -169,14 +237,27 @@ class TestErrors:
 
     def test_a_goal_behind_a_narrow_door_is_reachable_for_the_radius_that_the_error_names(self) -> None:
         world = World.from_boxes([(5, 0, 5.2, 4), (5, 4.5, 5.2, 8)], (0, 0, 10, 8))
-        with pytest.raises(PlanningError, match=r"too narrow; a radius of some 0.2[3-6] m would get through"):
-            build_roadmap(world, (1, 1), (9, 1))
-        assert build_roadmap(world, (1, 1), (9, 1), robot_radius=0.23).shortest_path() is not None
+        for radius in (0.255, 0.35, 0.8):
+            named = radius_named(world, (1, 1), (9, 1), radius)
+            assert 0.245 < named < 0.25
+            assert build_roadmap(world, (1, 1), (9, 1), robot_radius=named).shortest_path() is not None
 
-    def test_a_passage_just_too_narrow_to_tell_by_erosion_is_reported_when_the_roadmap_has_grown(self) -> None:
-        world = World.from_boxes([(5, 0, 5.2, 4), (5, 4.695, 5.2, 8)], (0, 0, 10, 8))
-        with pytest.raises(PlanningError, match="found none with 640 vertices: some passage is hardly wider"):
-            build_roadmap(world, (1, 1), (9, 1), num_vertices=40)
+    @pytest.mark.parametrize("radius", [0.25, 0.262, 0.28, 0.3])
+    def test_the_radius_named_gets_through_a_diagonal_corridor_of_square_cells(self, radius: float) -> None:
+        cells = 0.05 * (np.arange(200) + 0.5)
+        x, y = np.meshgrid(cells, cells)
+        free = (np.abs(0.8 * y - 0.6 * x - 1) < 0.26) | (np.hypot(x - 1, y - 2) < 0.6) | (np.hypot(x - 9, y - 8) < 0.6)
+        world = World.from_cells(free, 0.05)
+        named = radius_named(world, (1, 2), (9, 8), radius)
+        assert 0.2 < named < radius
+        assert build_roadmap(world, (1, 2), (9, 8), robot_radius=named).shortest_path() is not None
+
+    @pytest.mark.parametrize("radius", [0.35, 0.5])
+    def test_through_a_gap_of_two_radii_the_robot_does_not_fit(self, radius: float) -> None:
+        world = World.from_boxes([(5, 0, 5.2, 4), (5, 4 + 2 * radius, 5.2, 8)], (0, 0, 10, 8))
+        with pytest.raises(PlanningError, match="it does not fit through the passages"):
+            build_roadmap(world, (1, 1), (9, 1), robot_radius=radius)
+        assert 0.98 * radius < radius_named(world, (1, 1), (9, 1), radius) < radius
 
     def test_a_place_that_the_roadmap_does_not_reach_is_named(self) -> None:
         world = World.from_boxes([(5, 0, 5.2, 8)], (0, 0, 10, 8))
@@ -197,3 +278,11 @@ class TestErrors:
     def test_arguments_out_of_range_are_refused(self, world: World, arguments: dict, message: str) -> None:
         with pytest.raises(InvalidInputError, match=message):
             build_roadmap(**{"world": world, "start": START, "goal": GOAL} | arguments)
+
+
+def radius_named(world: World, start: tuple, goal: tuple, radius: float) -> float:
+    """The radius of which the error says that it would get through."""
+    with pytest.raises(PlanningError) as caught:
+        build_roadmap(world, start, goal, robot_radius=radius)
+    (named,) = re.findall(r"a radius of (\S+) m would get through", str(caught.value))
+    return float(named)

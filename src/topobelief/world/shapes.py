@@ -114,15 +114,35 @@ def polygons(shape: Shape) -> list[Polygon]:
     return [part for part in _shapely.get_parts(shape) if isinstance(part, Polygon) and part.area > 0]
 
 
+def triangles(polygon: Polygon) -> FloatArray:
+    """Triangles with the polygon's own corners that make it up (a constrained Delaunay triangulation), shape (T, 3, 2)."""
+    pieces = _shapely.get_parts(_shapely.constrained_delaunay_triangles(polygon))
+    return _shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3]
+
+
+def corners(polygon: Polygon, tolerance: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Corners of a polygon, each with the one before and the one after it, the interior on the left; shapes (N, 2).
+
+    Those are left out without which the outline is off by no more than about a tolerance. Each ring is taken by itself.
+    """
+    rings = _shapely.get_rings(_shapely.orient_polygons(polygon))
+    corners, ring = _shapely.get_coordinates(_shapely.simplify(rings, tolerance), return_index=True)
+    first = np.flatnonzero(ring[1:] == ring[:-1])
+    starts_ring = np.r_[True, np.diff(ring[first]) != 0]
+    before = first - 1
+    before[starts_ring] = first[np.r_[starts_ring[1:], True]]
+    return corners[first], corners[before], corners[first + 1]
+
+
+def within(shape: Shape, corners: FloatArray) -> Shape:
+    """The part of a shape in the rectangle x_min, y_min, x_max, y_max."""
+    return _shapely.intersection(shape, _shapely.box(*corners))
+
+
 def holes(shape: Polygon | MultiPolygon) -> ShapeArray:
     """The holes of the polygons of a shape, each filled."""
     rings, polygon = _shapely.get_rings(_shapely.get_parts(shape), return_index=True)
     return _shapely.polygons(rings[np.r_[False, polygon[1:] == polygon[:-1]]])
-
-
-def outline(shape: Shape, spacing: float) -> FloatArray:
-    """Corners of a shape, each once, and points between them at most `spacing` apart; shape (N, 2)."""
-    return np.unique(_shapely.get_coordinates(_shapely.segmentize(shape, spacing)), axis=0)
 
 
 def largest_within(shapes: ShapeArray, others: ShapeArray) -> FloatArray:

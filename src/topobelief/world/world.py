@@ -198,10 +198,6 @@ class World:
         """Whether nothing stands on the line of sight from each start to its end, shape (N,)."""
         return self.segments_free(starts, ends, 0.0)
 
-    def outline(self, spacing: float) -> FloatArray:
-        """Corners of all obstacles and of the bounds, and points between them at most `spacing` apart; shape (N, 2)."""
-        return shapes.outline(self.free, spacing)
-
     def component(self, point: ArrayLike, radius: float) -> Polygon:
         """All places that the centre of a disc can be moved to from a point, slightly too large.
 

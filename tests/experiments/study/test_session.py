@@ -88,7 +88,8 @@ def test_a_task_played_again_gives_the_same_row(make_tasks):
 
 
 def test_seeds_change_the_candidates(make_tasks):
-    lengths = [play(task)["candidate_lengths"] for task in make_tasks(strategies="[shortest]")[::4]]
+    """Those at least that are more than one to a homotopy class: the shortest paths are the same for all seeds."""
+    lengths = [play(task)["candidate_lengths"] for task in make_tasks(strategies="[shortest]", candidates="12}")[::4]]
     assert len(lengths) == 3
     assert not any(np.array_equal(lengths[0], other) for other in lengths[1:])
 
