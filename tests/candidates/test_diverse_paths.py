@@ -132,19 +132,21 @@ class TestPaths:
 
     def test_on_a_map_with_salt_are_as_wide_spread_as_on_the_clean_one(self, tmp_path: Path) -> None:
         """One cell in a thousand of the depot is occupied by noise: the classes of the specks take no path's place."""
-        clean = map_file("depot.yaml")
-        image = np.array(Image.open(clean.with_suffix(".pgm")))
-        image[np.random.default_rng(0).random(image.shape) < 0.001] = 0
-        Image.fromarray(image).save(tmp_path / "depot.pgm")
-        (tmp_path / "depot.yaml").write_text(clean.read_text())
-        start, goal = (12, 14.5), (1, 1)
-        spread = []
-        for file in (clean, tmp_path / "depot.yaml"):
-            roadmap = build_roadmap(read_world(file), start, goal)
-            lengths = [path_length(path) for path in diverse_paths(roadmap, start, goal)]
+        clean, start, goal = map_file("depot.yaml"), (12, 14.5), (1, 1)
+
+        def spread(file: Path) -> float:
+            lengths = [path_length(path) for path in diverse_paths(build_roadmap(read_world(file), start, goal), start, goal)]
             assert len(lengths) == 20
-            spread.append(lengths[-1] - lengths[0])
-        assert spread[1] > 0.9 * spread[0] > 4.0
+            return lengths[-1] - lengths[0]
+
+        salted: list[float] = []
+        for seed in range(3):
+            image = np.array(Image.open(clean.with_suffix(".pgm")))
+            image[np.random.default_rng(seed).random(image.shape) < 0.001] = 0
+            Image.fromarray(image).save(tmp_path / "depot.pgm")
+            (tmp_path / "depot.yaml").write_text(clean.read_text())
+            salted.append(spread(tmp_path / "depot.yaml"))
+        assert np.median(salted) > 0.9 * spread(clean) > 4.0
 
     def test_in_the_office_are_20_with_at_least_3_classes_within_2_5_times_the_shortest(self) -> None:
         office = read_walls(map_file("willow_walls.csv"), bounds=(7, -9, 29, 9.5))

@@ -8,15 +8,22 @@ import pytest
 from topobelief.candidates.detours import Balls
 from topobelief.candidates.homotopy import Rays, shortest_paths_by_class
 from topobelief.candidates.polyline import path_length
-from topobelief.candidates.roadmap import Roadmap, build_roadmap
+from topobelief.candidates.roadmap import Roadmap
 from topobelief.candidates.straightening import Straightening
 from topobelief.world import World
 
 
 @pytest.fixture(scope="module")
 def roadmap() -> Roadmap:
-    boxes = [(6, 4, 7, 6), (12, 3.5, 13, 6.5)]
-    return build_roadmap(World.from_boxes(boxes, (0, 0, 20, 10)), (1, 5), (19, 5), num_vertices=300)
+    """A lattice about two obstacles, whose paths have corners to cut."""
+    world, radius = World.from_boxes([(6, 4, 7, 6), (12, 3.5, 13, 6.5)], (0, 0, 20, 10)), 0.35
+    lattice = np.stack(np.meshgrid(np.arange(0.7, 20, 0.8), np.arange(0.9, 9.5, 0.8)), axis=-1).reshape(-1, 2)
+    vertices = np.concatenate([[(1.0, 5.0), (19.0, 5.0)], lattice[world.segments_free(lattice, lattice, radius)]])
+    i, j = np.triu_indices(len(vertices), k=1)
+    near = np.linalg.norm(vertices[i] - vertices[j], axis=1) < 1.2
+    edges = np.stack([i[near], j[near]], axis=1)
+    free = world.segments_free(vertices[edges[:, 0]], vertices[edges[:, 1]], radius)
+    return Roadmap(world, radius, world.component((1, 5), radius), vertices, edges[free])
 
 
 def test_both_ways_keep_the_class_and_shorten(roadmap: Roadmap) -> None:
