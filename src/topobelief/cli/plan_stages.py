@@ -242,7 +242,7 @@ def exact_entropies(
                     failures.append(error)
             update(done + 1, len(actions))
     if failures:
-        reporter.note(f"exact values in the picture: {len(failures)} of {len(actions)} cannot be had; {failures[0]}")
+        reporter.note(f"exact values in the picture: {len(failures)} of {len(actions)} could not be computed; {failures[0]}")
     known = int(np.count_nonzero(~np.isnan(values))) + len(failures)
     if known < len(actions):
         reporter.say(f"exact values in the picture: the first {known} of the ranking, all that {EXACT_SECONDS:g} s allowed")

@@ -19,7 +19,7 @@ from topobelief.linalg.elimination_paths import FormFactor, KnownColumns, change
 from topobelief.linalg.elimination_tree import EliminationTree
 
 _HOLD_STRONGEST_ERROR = 1e-6  # nats; below it one more factorisation would not be seen
-_APPENDED_SHARE = 0.2  # of the longest path: poses that may follow an old order before a new one pays
+_APPENDED_SHARE = 0.2  # of the longest path: poses that may follow an old order before a new one is worthwhile
 
 
 class PriorFactors:

@@ -19,7 +19,7 @@ from topobelief.planning.planner import Planner
 from topobelief.planning.registry import SIGNATURES
 
 STRATEGIES = ("spanning_trees", "von_neumann_approx", "von_neumann", "optimum", "standard", "shortest", "random")
-"""Three signatures; "optimum" proves s_ST's ranking through; "standard" evaluates every candidate; the last two look away."""
+"""Three signatures; "optimum" proves the best by s_ST's ranking; "standard" evaluates all; the last two ignore the graph."""
 
 _FORCED = re.compile(r"path-([1-9][0-9]*)")
 

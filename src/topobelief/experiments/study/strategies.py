@@ -17,7 +17,7 @@ from topobelief.planning.planner import Planner
 from topobelief.planning.registry import SIGNATURES
 
 STRATEGIES = ("spanning_trees", "von_neumann", "von_neumann_approx", "optimum", "standard", "shortest", "random")
-"""Three signatures; "optimum" proves s_ST's ranking through; "standard" evaluates every candidate; the last two look away."""
+"""Three signatures; "optimum" proves the best by s_ST's ranking; "standard" evaluates all; the last two ignore the graph."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
