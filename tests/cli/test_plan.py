@@ -236,7 +236,10 @@ def test_exact_values_that_cannot_be_had_cost_neither_decision_nor_files(topobel
     monkeypatch.setattr(Planner, "entropies", fails)
     outcome = topobelief(office.plan("--candidates", 3))
     assert (outcome.code, outcome.err) == (0, "")
-    assert "exact values in the picture: 3 of 3 cannot be had; joint entropy: the graph is too ill-conditioned" in outcome.out
+    assert (
+        "exact values in the picture: 3 of 3 could not be computed; joint entropy: the graph is too ill-conditioned"
+        in outcome.out
+    )
     assert {path.name for path in (tmp_path / "out").iterdir()} == PICTURES | {"decision.json"}
 
 

@@ -13,28 +13,30 @@ import typer
 def benchmark(
     graph_files: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="[GRAPH]...", help="Pose graphs to measure beside generated ones, .g2o or .toro."),
+        typer.Argument(metavar="[GRAPH]...", help="Pose graphs to measure besides generated ones, .g2o or .toro."),
     ] = None,
     sizes: Annotated[
         str | None,
-        typer.Option(help="Poses of the generated graphs, by commas; 1000,3500,10000,100000 if not given, none if empty."),
+        typer.Option(
+            help="Poses of the generated graphs, comma-separated; 1000,3500,10000,100000 if not given, none if empty."
+        ),
     ] = None,
-    candidates: Annotated[int | None, typer.Option(help="Actions of a session; 1000 if not given.", min=2)] = None,
+    candidates: Annotated[int | None, typer.Option(help="Candidates for each graph; 1000 if not given.", min=2)] = None,
     repeat: Annotated[int | None, typer.Option(help="Repetitions of each timing; 5 if not given.", min=1)] = None,
-    seed: Annotated[int, typer.Option(help="Of generated graphs and of candidates.", min=0)] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of generated graphs and candidates.", min=0)] = 0,
     quick: Annotated[
         bool, typer.Option("--quick", help="A small graph and few candidates, for a first look: about a minute.")
     ] = False,
     out: Annotated[
-        Path | None, typer.Option(help="Folder for benchmark.json, and for a picture if there are two sizes.")
+        Path | None, typer.Option(help="Folder for benchmark.json, and for a picture if there are two sizes or more.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")] = False,
 ) -> None:
-    """Time this engine beside GTSAM, sparse factorisations from scratch and the determinant lemma.
+    """Compare the speed of this engine with GTSAM, sparse factorisation from scratch and the determinant lemma.
 
-    Ratios come first: all of a session's actions, set-up included. Memory, error bounds and proofs follow.
+    Prints ratios for all candidates first, set-up included, then memory, error bounds and proofs.
 
-    Other work on the machine distorts the figures. Needs the extras fast and gtsam.
+    Other programs running on the machine distort the times. Needs the extras fast and gtsam.
     """
     from topobelief.cli.console import Reporter
     from topobelief.cli.extras import require_extras

@@ -10,7 +10,7 @@ from typer.core import TyperCommand
 
 
 class Command(TyperCommand):
-    """A command that refuses an option given twice, of which the first would be dropped without a word."""
+    """A command that refuses an option given twice, because the first value would be dropped silently."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse as usual, after the check."""

@@ -18,7 +18,7 @@ _PIPE_WIDTH = 160  # columns where there is no terminal to ask
 
 
 class Reporter:
-    """Speaks to a person, or, for a program, prints one JSON document and nothing else.
+    """Prints for a person, or, for a program, prints one JSON document and nothing else.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class Reporter:
                 self._answer.print(renderable, markup=False, soft_wrap=isinstance(renderable, str))
 
     def warn(self, text: str) -> None:
-        """Print a line on stderr, whoever listens."""
+        """Print a line on stderr, with or without --json."""
         print(f"topobelief: {text}", file=sys.stderr)
 
     def note(self, text: str) -> None:

@@ -14,7 +14,7 @@ def info(
     graph_file: Annotated[Path, typer.Argument(metavar="GRAPH", help="Pose graph in g2o or TORO format.")],
     optimize: Annotated[
         bool,
-        typer.Option("--optimize/--no-optimize", help="Judge it at its maximum-likelihood poses, or at those in the file."),
+        typer.Option("--optimize/--no-optimize", help="Evaluate it at its maximum-likelihood poses, or at those in the file."),
     ] = True,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")] = False,
     drop: Drop = None,

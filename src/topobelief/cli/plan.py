@@ -101,13 +101,13 @@ def _detour(text: str) -> float:
 def plan(
     context: typer.Context,
     graph_file: Annotated[Path, typer.Argument(metavar="GRAPH", help="Pose graph in g2o or TORO format.")],
-    goal: Annotated[tuple[float, float], typer.Option(metavar="X Y", help="Where to go, metres.", callback=_finite)],
+    goal: Annotated[tuple[float, float], typer.Option(metavar="X Y", help="The goal, metres.", callback=_finite)],
     start: Annotated[
         GivenStart | None,
         typer.Option(
             metavar="ID | X Y",
             parser=_start,
-            help="Where the robot stands: id of a pose, or metres.",
+            help="Where the robot starts: id of a pose, or X Y in metres.",
             show_default="the last pose",
         ),
     ] = None,
@@ -118,14 +118,17 @@ def plan(
     along_trajectory: Annotated[
         bool,
         typer.Option(
-            "--along-trajectory", metavar="", help="No map: free is where the robot has been.", rich_help_panel=_WORLD
+            "--along-trajectory",
+            metavar="",
+            help="Use no map: where the robot has been counts as free.",
+            rich_help_panel=_WORLD,
         ),
     ] = False,
     width: Annotated[
         float | None,
         typer.Option(
             metavar="M",
-            help="Metres that are free to each side of the trajectory.",
+            help="Free width on each side of the trajectory, metres.",
             show_default="twice its typical step",
             callback=_above_zero,
             rich_help_panel=_WORLD,
@@ -133,27 +136,30 @@ def plan(
     ] = None,
     unknown: Annotated[
         Unknown,
-        typer.Option(metavar="WHAT", help="Unknown cells of a ROS map count as occupied or free.", rich_help_panel=_WORLD),
+        typer.Option(metavar="WHAT", help="Treat unknown cells of a ROS map as occupied or free.", rich_help_panel=_WORLD),
     ] = "occupied",
     robot_radius: Annotated[
         float, typer.Option(metavar="M", help="Metres.", callback=_above_zero, rich_help_panel=_WORLD)
     ] = 0.35,
-    candidates: Annotated[int, typer.Option(min=1, metavar="N", help="Paths to compare.", rich_help_panel=_CANDIDATES)] = 20,
+    candidates: Annotated[
+        int, typer.Option(min=1, metavar="N", help="Number of paths to compare.", rich_help_panel=_CANDIDATES)
+    ] = 20,
     max_detour: Annotated[
         float | None,
         typer.Option(
             metavar="FACTOR",
             parser=_detour,
-            help='Longest path, in lengths of the shortest; "none" or 0 for no limit.',
+            help='Longest path, as a multiple of the shortest; "none" or 0 for no limit.',
             show_default="1.3",
             rich_help_panel=_CANDIDATES,
         ),
     ] = None,
     vertices: Annotated[
-        int, typer.Option(min=2, metavar="N", help="Least size of the roadmap.", rich_help_panel=_CANDIDATES)
+        int, typer.Option(min=2, metavar="N", help="Minimum number of roadmap vertices.", rich_help_panel=_CANDIDATES)
     ] = 1000,
     seed: Annotated[
-        int, typer.Option(min=0, metavar="N", help="The same seed, the same paths.", rich_help_panel=_CANDIDATES)
+        int,
+        typer.Option(min=0, metavar="N", help="Random seed; the same seed gives the same paths.", rich_help_panel=_CANDIDATES),
     ] = 0,
     spacing: Annotated[
         float, typer.Option(metavar="M", help="Metres between new poses.", callback=_above_zero, rich_help_panel=_FACTORS)
@@ -162,7 +168,7 @@ def plan(
         float,
         typer.Option(
             metavar="M",
-            help="A loop closes within this distance, metres.",
+            help="Loops close within this distance, metres.",
             callback=_above_zero,
             rich_help_panel=_FACTORS,
         ),
@@ -180,7 +186,11 @@ def plan(
     min_index_gap: Annotated[
         int | None,
         typer.Option(
-            min=2, metavar="N", help="… with a pose at least so many back.", show_default="5", rich_help_panel=_FACTORS
+            min=2,
+            metavar="N",
+            help="… and with a pose at least this many poses earlier.",
+            show_default="5",
+            rich_help_panel=_FACTORS,
         ),
     ] = None,
     sigma_p: Annotated[
@@ -208,7 +218,7 @@ def plan(
         typer.Option(
             "--line-of-sight/--no-line-of-sight",
             metavar="",
-            help="A loop closes only with a pose in sight.",
+            help="Close loops only with poses in line of sight.",
             show_default="yes",
             rich_help_panel=_RULES,
         ),
@@ -218,7 +228,7 @@ def plan(
         typer.Option(
             "--paper",
             metavar="",
-            help="The rules of the paper where not said otherwise: headings within 1 rad, index gap 2, "
+            help="Use the rules of the paper unless other options are given: headings within 1 rad, index gap 2, "
             "no line of sight, no detour limit.",
             rich_help_panel=_RULES,
         ),
@@ -229,7 +239,7 @@ def plan(
             callback=one_of(OBJECTIVES),
             autocompletion=completed(OBJECTIVES),
             metavar="NAME",
-            help="Entropy to minimise: joint, of all poses (the paper's); map, of those that exist now; or per_pose.",
+            help="Entropy to minimise: joint, of all poses (the paper's); map, of existing poses; or per_pose.",
             rich_help_panel=_DECISION,
         ),
     ] = "joint",
@@ -239,20 +249,20 @@ def plan(
             callback=one_of(SIGNATURES),
             autocompletion=completed(SIGNATURES),
             metavar="NAME",
-            help="What ranks the paths: spanning_trees, von_neumann or von_neumann_approx.",
+            help="Signature that ranks paths: spanning_trees, von_neumann or von_neumann_approx.",
             rich_help_panel=_DECISION,
         ),
     ] = "spanning_trees",
     normalized: Annotated[
         bool,
-        typer.Option("--normalized", metavar="", help="Add the noise to von_neumann_approx.", rich_help_panel=_DECISION),
+        typer.Option("--normalized", metavar="", help="Add a noise term to von_neumann_approx.", rich_help_panel=_DECISION),
     ] = False,
     allow_dense_spectrum: Annotated[
         bool,
         typer.Option(
             "--allow-dense-spectrum",
             metavar="",
-            help="Let von_neumann take its time on large graphs.",
+            help="Allow von_neumann on large graphs, which is slow.",
             rich_help_panel=_DECISION,
         ),
     ] = False,
@@ -260,13 +270,15 @@ def plan(
         float | None,
         typer.Option(
             metavar="NATS",
-            help="Entropy that is good enough: no other path is bounded.",
+            help="Accept a path with at most this entropy, without bounding the others.",
             rich_help_panel=_DECISION,
         ),
     ] = None,
     deadline: Annotated[
         float | None,
-        typer.Option(metavar="S", help="Seconds for the decision.", callback=_above_zero, rich_help_panel=_DECISION),
+        typer.Option(
+            metavar="S", help="Time limit for the decision, seconds.", callback=_above_zero, rich_help_panel=_DECISION
+        ),
     ] = None,
     bounds: Annotated[
         str,
@@ -283,7 +295,7 @@ def plan(
         Determinant,
         typer.Option(
             metavar="NAME",
-            help="In the lower bound: cholesky, exact; or hadamard, by its diagonal.",
+            help="Determinant in the lower bound: cholesky (exact) or hadamard (from diagonal).",
             rich_help_panel=_PROOF,
         ),
     ] = "cholesky",
@@ -291,20 +303,20 @@ def plan(
         Proof,
         typer.Option(
             metavar="NAME",
-            help="none, ranking alone; bounded; or optimal, exact evaluations until the best is proven.",
+            help="none: ranking only; bounded; or optimal: exact evaluations until proven.",
             rich_help_panel=_PROOF,
         ),
     ] = "bounded",
     max_evaluations: Annotated[
         int | None,
-        typer.Option(min=0, metavar="N", help="Most exact evaluations for the proof.", rich_help_panel=_PROOF),
+        typer.Option(min=0, metavar="N", help="Maximum number of exact evaluations.", rich_help_panel=_PROOF),
     ] = None,
     optimize: Annotated[
         bool,
         typer.Option(
             "--optimize/--no-optimize",
             metavar="",
-            help="Find the maximum-likelihood poses first.",
+            help="Compute the maximum-likelihood poses first.",
         ),
     ] = True,
     exact: Annotated[
@@ -312,7 +324,7 @@ def plan(
         typer.Option(
             "--exact/--no-exact",
             metavar="",
-            help="Evaluate every path for the picture of the bounds, as far as a few seconds go.",
+            help="Evaluate every path for the bounds picture, for a few seconds at most.",
             rich_help_panel=_OUTPUT,
         ),
     ] = True,
@@ -320,7 +332,7 @@ def plan(
         Path | None,
         typer.Option(
             metavar="FOLDER",
-            help="For paths.png, bounds.png and decision.json.",
+            help="Folder for paths.png, bounds.png and decision.json.",
             show_default="out; with --json, none",
             rich_help_panel=_OUTPUT,
         ),
@@ -337,7 +349,7 @@ def plan(
 ) -> None:
     """Choose the best path to a goal on a pose-graph map.
 
-    Ranks diverse paths by a topological signature of the graph that each leaves, and bounds what that can cost.
+    Ranks diverse paths by a topological signature of the resulting graph, and bounds the loss of that choice.
     """
     if (map_file is None) == (not along_trajectory):
         raise typer.BadParameter("expected one of --map FILE and --along-trajectory.", param_hint="the world")

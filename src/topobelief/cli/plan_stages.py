@@ -181,7 +181,7 @@ def exact_entropies(
 ) -> FloatArray:
     """What the decision evaluated and, if wanted and time allows, the rest in ranking order; nan where unknown; shape (K,).
 
-    The decision stands without them, so a value that cannot be had is told and left out.
+    The decision stands without them, so a value that could not be computed is reported and left out.
     """
     values = decision.entropies.copy()
     if not wanted:
@@ -199,7 +199,7 @@ def exact_entropies(
                     failures.append(error)
             update(done + 1, len(actions))
     if failures:
-        reporter.note(f"exact values in the picture: {len(failures)} of {len(actions)} cannot be had; {failures[0]}")
+        reporter.note(f"exact values in the picture: {len(failures)} of {len(actions)} could not be computed; {failures[0]}")
     known = int(np.count_nonzero(~np.isnan(values))) + len(failures)
     if known < len(actions):
         reporter.say(f"exact values in the picture: the first {known} of the ranking, all that {EXACT_SECONDS:g} s allowed")
@@ -235,11 +235,11 @@ def more_candidates_hint(decision: Decision, rule: CandidateRule, *, along_traje
     if decision.num_actions > 1:
         return None
     if rule.num_paths == 1:
-        return "For something to choose from, raise --candidates (1 now)."
+        return "To get more candidates, raise --candidates (1 now)."
     detour = f"raise --max-detour ({rule.max_detour:g} now), " if rule.max_detour is not None else ""
     width = ", raise --width" if along_trajectory else ""
     return (
-        f"For something to choose from, {detour}lower --robot-radius ({rule.robot_radius:g} m now){width} "
+        f"To get more candidates, {detour}lower --robot-radius ({rule.robot_radius:g} m now){width} "
         f"or raise --vertices ({rule.num_vertices} now)."
     )
 

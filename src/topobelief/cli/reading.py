@@ -28,19 +28,19 @@ RobustAsPlain = Annotated[
     typer.Option(
         "--robust-as-plain",
         metavar="",
-        help="Take switchable and max-mixture edges for plain ones.",
+        help="Treat switchable and max-mixture edges as plain ones.",
         rich_help_panel=_READING,
     ),
 ]
 Edge2OrderOption = Annotated[
     Edge2Order,
-    typer.Option(metavar="NAME", help="Order of the information in EDGE2 lines: toro or isam.", rich_help_panel=_READING),
+    typer.Option(metavar="NAME", help="Order of information entries in EDGE2 lines: toro or isam.", rich_help_panel=_READING),
 ]
 Component = Annotated[
     str,
     typer.Option(
         metavar="WHICH",
-        help="Of a disconnected graph: all, the largest part, or that of the pose with this id.",
+        help="Part of a disconnected graph: all, largest, or the one with this pose id.",
         rich_help_panel=_READING,
     ),
 ]

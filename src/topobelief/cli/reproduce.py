@@ -11,23 +11,23 @@ import typer
 def reproduce(
     graph_files: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="[GRAPH]...", help="Real pose graphs to decide on besides, .g2o or .toro."),
+        typer.Argument(metavar="[GRAPH]...", help="Real pose graphs to include, .g2o or .toro."),
     ] = None,
     quick: Annotated[
         bool, typer.Option("--quick", help="Few seeds and small graphs, for a first look: under two minutes.")
     ] = False,
-    seed: Annotated[int, typer.Option(help="The first one; all others follow from it.", min=0)] = 0,
+    seed: Annotated[int, typer.Option(help="First random seed; all others follow from it.", min=0)] = 0,
     out: Annotated[
         Path | None,
         typer.Option(
             metavar="FOLDER",
-            help="For the report; a run that is there continues.",
+            help="Folder for the report; an earlier run continues.",
             show_default="out/reproduction, with --quick out/reproduction-quick",
         ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the claims as JSON and nothing else.")] = False,
 ) -> None:
-    """Run the experiments of the paper, say claim by claim what holds, and write one report.
+    """Run the experiments of the paper, say for each claim whether it holds, and write one report.
 
     Killed at any moment, the same command continues where it stopped. Under two minutes with --quick, under twenty without, on
     two cores with nothing else to do. Needs the extras fast, gtsam and page.

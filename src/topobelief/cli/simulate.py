@@ -28,29 +28,29 @@ def simulate(
         typer.Option(
             callback=one_of(OBJECTIVES),
             autocompletion=completed(OBJECTIVES),
-            help="Entropy to minimise: of all poses (the paper's), of those that exist now, or per pose.",
+            help="Entropy to minimise: of all poses (the paper's), of existing poses, or per pose.",
         ),
     ] = "joint",
-    seed: Annotated[int, typer.Option(min=0, help="The same seed, the same run.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed; the same seed gives the same run.")] = 0,
     noise: Annotated[str, typer.Option(help=_NOISE_HELP)] = "physical",
-    unknown: Annotated[bool, typer.Option("--unknown", help="Start with an empty map in place of the floor plan.")] = False,
+    unknown: Annotated[bool, typer.Option("--unknown", help="Start with an empty map instead of the floor plan.")] = False,
     max_detour: Annotated[
         float | None,
         typer.Option(
             metavar="FACTOR",
-            help="Longest path, in lengths of the shortest; 0 for no limit.",
+            help="Longest path, as a multiple of the shortest; 0 for no limit.",
             show_default="the scenario's",
             min=0,
         ),
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the run in --out from its last key pose.")] = False,
     displaced: Annotated[
-        float, typer.Option(help="With --resume: how far the robot stands ahead of where it believes to be, metres.")
+        float, typer.Option(help="With --resume: how far ahead of its estimate the robot stands, metres.")
     ] = 0.0,
     pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Draw the run and its decisions.")] = True,
     recording: Annotated[bool, typer.Option("--recording", help="Write run.mcap, which Foxglove opens (extra view).")] = False,
     out: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="For all results.", show_default="out/ and the scenario's name")
+        Path | None, typer.Option(metavar="FOLDER", help="Folder for all results.", show_default="out/ and the scenario's name")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print run.json and nothing else.")] = False,
 ) -> None:
@@ -115,32 +115,32 @@ def simulate(
 
 def simulate_compare(
     scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help=_SCENARIO_HELP)],
-    strategies: Annotated[str, typer.Option(help="By commas; the first is what the others are compared with.")] = (
+    strategies: Annotated[str, typer.Option(help="Comma-separated; the others are compared with the first.")] = (
         "shortest,spanning_trees"
     ),
     objective: Annotated[
-        str, typer.Option(callback=one_of(OBJECTIVES), autocompletion=completed(OBJECTIVES), help="As for simulate.")
+        str, typer.Option(callback=one_of(OBJECTIVES), autocompletion=completed(OBJECTIVES), help="As in simulate.")
     ] = "joint",
-    seeds: Annotated[int, typer.Option(min=1, help="How many, from 0 on.")] = 20,
-    noise: Annotated[str, typer.Option(help="Injected, as for simulate; redrawn for each recorded graph.")] = "0.35",
-    redraws: Annotated[int, typer.Option(min=1, help="Of the noise, for each recorded graph.")] = 50,
+    seeds: Annotated[int, typer.Option(min=1, help="Number of seeds, starting at 0.")] = 20,
+    noise: Annotated[str, typer.Option(help="Injected noise, as in simulate; redrawn for each graph.")] = "0.35",
+    redraws: Annotated[int, typer.Option(min=1, help="Noise draws for each recorded graph.")] = 50,
     max_detour: Annotated[
         float | None,
         typer.Option(
             metavar="FACTOR",
-            help="Longest path, in lengths of the shortest; 0 for no limit.",
+            help="Longest path, as a multiple of the shortest; 0 for no limit.",
             show_default="the scenario's",
             min=0,
         ),
     ] = None,
-    workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
+    workers: Annotated[int, typer.Option(min=1, help="Number of processes.")] = 1,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FOLDER", help="For all runs and the table; what is there is not driven again."),
+        typer.Option(metavar="FOLDER", help="Folder for runs and table; finished runs are kept."),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the table as JSON and nothing else.")] = False,
 ) -> None:
-    """Compare strategies on the last session of a scenario, on expectations: the noise of each graph is drawn many times.
+    """Compare the expected map error of strategies on a scenario's last session, over many draws of the noise.
 
     All earlier sessions of a seed are driven once, so that the strategies decide on the same graph.
     """

@@ -16,15 +16,17 @@ def study(
     out: Annotated[
         Path | None,
         typer.Option(
-            metavar="FOLDER", help="For the rows; a study that is there continues.", show_default="out/ and the name of SPEC"
+            metavar="FOLDER", help="Folder for the rows; an earlier study continues.", show_default="out/ and the name of SPEC"
         ),
     ] = None,
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes of this machine.", show_default="one a core")] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Number of processes on this machine.", show_default="one per core")
+    ] = None,
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="A dask.distributed cluster, such as tcp://10.0.0.1:8786.")
     ] = None,
     retry_failed: Annotated[
-        bool, typer.Option("--retry-failed", help="Play again the tasks that failed in an earlier run.")
+        bool, typer.Option("--retry-failed", help="Run tasks again that failed in an earlier run.")
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the outcome as JSON and nothing else.")] = False,
 ) -> None:
@@ -81,13 +83,14 @@ def _workers(num_workers: int | None, scheduler: str | None) -> Workers:
 
 
 def study_report(
-    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="What `topobelief study` wrote, finished or not.")],
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Output of `topobelief study`, complete or not.")],
     out: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="For the pictures and summary.csv.", show_default="FOLDER/report")
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Folder for the pictures and summary.csv.", show_default="FOLDER/report"),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON and nothing else.")] = False,
 ) -> None:
-    """Draw what a study found: what each strategy loses, how it ranks, how long it takes."""
+    """Plot the results of a study: loss, ranking quality and time of each strategy."""
     from topobelief.cli.console import Reporter
 
     reporter = Reporter(as_json=as_json)

@@ -15,7 +15,7 @@ _SECONDS_BETWEEN_LINES = 30.0
 
 
 class StudyProgress:
-    """Speaks on stderr while a study runs."""
+    """Reports on stderr while a study runs."""
 
     def __init__(self) -> None:
         console = Console(stderr=True)
@@ -32,7 +32,7 @@ class StudyProgress:
         self._bar.stop()
 
     def update(self, progress: runner.Progress) -> None:
-        """Tell the news."""
+        """Report progress."""
         text = description(progress)
         self._bar.update(self._task, completed=progress.done, total=progress.total, description=text)
         if self._bar.disable and time.monotonic() - self._spoke > _SECONDS_BETWEEN_LINES:

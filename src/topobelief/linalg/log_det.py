@@ -7,7 +7,7 @@ behind each (Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., th
 Higham and Mary, SIAM J. Sci. Comput. 41, 2019); from the assembly, entries on the matrix's pattern of
 u sqrt(B_i B_j), B the magnitude of the terms added. |(M^-1)_ij| <= v_i v_j with v^2 = diag M^-1, exact on small matrices and
 sampled on large ones (M^-1 R^T z has covariance M^-1 for random signs z). Where roundings repeat themselves, as on graphs
-whose edges are all alike, they add up instead of averaging out; the sums of M_ii v_i^2 and B_i v_i^2 stand for that.
+whose edges are all equal, they add up instead of averaging out; the sums of M_ii v_i^2 and B_i v_i^2 stand for that.
 
 Where the estimate is too large, what can be had without a factor is taken apart first, and the smallest estimate wins: the
 graph falls into its blocks, bridges among them, if the form allows it (`blocks`); rows that are far stronger than the others

@@ -1,4 +1,4 @@
-"""Forms after many actions on one prior, which is factored once: each action pays for what it touches (extra `fast`)."""
+"""Forms after many actions on one prior, which is factored once: an action costs only what it touches (extra `fast`)."""
 
 from __future__ import annotations
 

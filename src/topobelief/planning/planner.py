@@ -35,7 +35,7 @@ from topobelief.planning.registry import AUTO, BOUNDS, ENGINES, OBJECTIVES, SIGN
 from topobelief.planning.search import Clock, Progress, Search
 from topobelief.signatures.von_neumann import DENSE_SPECTRUM_SIZE, expected_spectrum_seconds
 
-_INCREMENTAL_WORK = 250_000  # actions times edges of the prior from which increments pay
+_INCREMENTAL_WORK = 250_000  # actions times edges of the prior above which increments are faster
 _SAMPLE_SIZE = 32  # actions whose bounds tell which family to take
 _OPEN_SHARE = 0.5  # what Fischer's bounds may leave open: they and so many exact values cost as much as chained bounds of all
 

@@ -1,1 +1,1 @@
-"""Topological signatures: quantities of the graph and of its noise, blind to where the poses are."""
+"""Topological signatures: quantities of the graph and of its noise, which do not depend on the poses."""

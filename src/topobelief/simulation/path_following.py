@@ -152,7 +152,7 @@ class PathFollower:
         return (0.0, 0.0) if self.arrived or self.stuck else self._steer(pose)
 
     def _next_to(self, pose: FloatArray) -> int:
-        """The point of the path next to the robot, near the last one and headed alike: a path may pass a place twice."""
+        """The path point nearest the robot, near the last one and with a similar heading: a path may pass a place twice."""
         here = float(self._stations[self._nearest])
         first, end = np.searchsorted(self._stations, (here - _SEARCH, here + _SEARCH)).tolist()
         costs = np.linalg.norm(self._points[first : end + 1] - pose[:2], axis=1)

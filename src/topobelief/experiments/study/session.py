@@ -51,7 +51,7 @@ def play(task: Task) -> Row:
     Raises
     ------
     TopobeliefError
-        Where a goal cannot be reached, the bounds do not cover the noise, or a value cannot be had.
+        Where a goal cannot be reached, the bounds do not cover the noise, or a value could not be computed.
     """
     graph, seconds = task.session.graph, 0.0
     last = len(task.session.goals) - 1
