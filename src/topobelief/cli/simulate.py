@@ -90,7 +90,8 @@ def simulate(
         )
         folder = out or Path("out") / place.name
         checked_folder(folder)
-        simulation_files.require_recorder(recording)
+        if recording:
+            require_extras("view")
         history = read_history(folder, scenario=place.name, options=options) if resume else None
     with reporter.stage("driving") as update, stop_on_interrupt() as should_stop:
         files = simulation_files.RunFiles(folder, keep=resume)

@@ -11,7 +11,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from html import escape
-from importlib import import_module
 from importlib.resources import files
 from string import Template
 from typing import Any, cast
@@ -21,10 +20,10 @@ from shapely import MultiPolygon
 
 from topobelief.arrays import FloatArray
 from topobelief.candidates.polyline import subdivided
-from topobelief.errors import InvalidInputError
 from topobelief.experiments.claims import Claim
 from topobelief.experiments.planning_sessions import NOISES, SESSIONS, PlanningSession, cases, office_session
 from topobelief.experiments.reproduction import Reproduction
+from topobelief.optional import load
 from topobelief.report.reproduction.figures import NamedFigure
 
 TITLE = "Topological belief space planning, reproduced"
@@ -182,11 +181,7 @@ def _finite(value: Any) -> Any:
 
 def _plotly() -> str:
     """plotly's script, whole."""
-    try:
-        offline: Any = import_module("plotly.offline")  # ships no types
-    except ImportError:
-        raise InvalidInputError("expected plotly to be installed, got none; run pip install 'topobelief[page]'") from None
-    return offline.get_plotlyjs()
+    return load("plotly.offline", "page").get_plotlyjs()
 
 
 def _text(name: str) -> str:
