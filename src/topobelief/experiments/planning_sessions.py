@@ -22,6 +22,7 @@ from topobelief.candidates.polyline import path_length
 from topobelief.candidates.predicted_factors import predict_actions
 from topobelief.candidates.roadmap import Roadmap, build_roadmap
 from topobelief.graph.action import Action, posterior
+from topobelief.graph.information import block_isotropic
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.planner import Planner
 from topobelief.simulation.scenario import Goal, Place, named_scenario
@@ -118,9 +119,9 @@ class ActionRow:
     anchored_upper: float
 
 
-def block_isotropic(xi: float) -> FloatArray:
+def session_information(xi: float) -> FloatArray:
     """Information of every edge of a session, shape (3, 3)."""
-    return np.diag([SIGMA_POSITION**-2, SIGMA_POSITION**-2, (xi * SIGMA_POSITION) ** -2])
+    return block_isotropic(SIGMA_POSITION, xi * SIGMA_POSITION)
 
 
 def office_session(name: SessionName, seed: int, xi: float, *, num_paths: int | None = None) -> PlanningSession:
@@ -144,7 +145,7 @@ def office_session(name: SessionName, seed: int, xi: float, *, num_paths: int | 
     scenario = named_scenario("office")
     first, second = scenario.goals
     start = np.array([scenario.start])
-    information = block_isotropic(xi)
+    information = session_information(xi)
     graph = PoseGraph(start, np.zeros((0, 2), dtype=np.int64), None, information)
     if name == "S1":
         return _session("S1", seed, xi, graph, scenario.world, scenario.start[:2], first, num_paths)
@@ -161,7 +162,7 @@ def _session(
     actions = predict_actions(
         graph,
         paths,
-        information=block_isotropic(xi),
+        information=session_information(xi),
         spacing=_SPACING,
         closure_radius=_CLOSURE_RADIUS,
         closure_angle=_CLOSURE_ANGLE,
