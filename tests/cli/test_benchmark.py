@@ -7,9 +7,9 @@ import pytest
 
 from topobelief import write_g2o
 from topobelief.cli.app import run
-from topobelief.experiments.benchmark.certificates import block_isotropic
 from topobelief.experiments.benchmark.run import SCHEMA, BenchmarkPlan
 from topobelief.experiments.benchmark.sessions import city_drive
+from topobelief.graph.information import block_isotropic
 
 
 @pytest.fixture

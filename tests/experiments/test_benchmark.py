@@ -11,11 +11,12 @@ from topobelief import PoseGraph, joint_entropy, log_num_spanning_trees, posteri
 from topobelief.errors import InvalidInputError
 from topobelief.experiments.benchmark import run
 from topobelief.experiments.benchmark.baselines import Baseline, baselines
-from topobelief.experiments.benchmark.certificates import block_isotropic, error_bounds, proof_size
+from topobelief.experiments.benchmark.certificates import error_bounds, proof_size
 from topobelief.experiments.benchmark.memory import peak_gigabytes
 from topobelief.experiments.benchmark.run import BenchmarkPlan, run_benchmark
 from topobelief.experiments.benchmark.sessions import BenchmarkSession, candidate_paths, city_drive
 from topobelief.experiments.benchmark.timing import MethodTime, SessionTimes, time_session
+from topobelief.graph.information import block_isotropic
 from topobelief.report.benchmark_tables import session_table
 from topobelief.signatures.von_neumann import von_neumann_entropy_approx
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import topobelief as tb
-from topobelief.experiments.planning_sessions import action_rows, block_isotropic, office_session
+from topobelief.experiments.planning_sessions import action_rows, office_session, session_information
 from topobelief.experiments.trajectory_uncertainty import best_and_worst
 
 
@@ -26,7 +26,7 @@ def test_sessions_are_those_of_the_paper(name: str, start: tuple[float, float], 
         assert (np.linalg.norm(after.positions[new] - after.positions[old], axis=1) < 2.0).all()
         turned = after.poses[new, 2] - after.poses[old, 2]
         assert (np.abs((turned + np.pi) % (2 * np.pi) - np.pi) <= 1.0 + 1e-9).all()
-        assert np.array_equal(after.information[-1], block_isotropic(0.35))
+        assert np.array_equal(after.information[-1], session_information(0.35))
 
 
 def test_the_second_session_plans_on_what_the_first_has_left() -> None:

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from graphs import NOISES, SE2_GROUP, SE3_GROUP, Noise, noises
 from topobelief.errors import InvalidGraphError
 from topobelief.graph.information import (
+    block_isotropic,
     checked_information,
     isotropic_weights,
     rotation_information_given_position,
@@ -127,3 +128,8 @@ def test_strategies_draw_what_they_say():
             assert np.linalg.eigvalsh(noise.draw(rng, 50)).min() > 0
     w_p, w_r = isotropic_weights(Noise(SE3_GROUP, "equal", 4.0, 10.0, 5.0).draw(rng, 1))
     assert 5.0 * np.sqrt(w_p / w_r) == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize(("tangent_dim", "expected"), [(3, [4, 4, 16]), (6, [4, 4, 4, 16, 16, 16])])
+def test_block_isotropic_noise_is_inverse_variances_on_the_diagonal(tangent_dim, expected):
+    assert np.array_equal(block_isotropic(0.5, 0.25, tangent_dim=tangent_dim), np.diag(expected))

@@ -7,6 +7,7 @@ import pytest
 
 from topobelief.errors import IllConditionedError, InvalidInputError
 from topobelief.graph.action import Action
+from topobelief.graph.information import block_isotropic
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning import planner as planner_module
 from topobelief.planning.decision import Decision
@@ -78,7 +79,7 @@ def test_anchored_bounds_enclose_and_rule_out_more_than_fischers():
 
 def flat(sigma_rotation: float) -> tuple[PoseGraph, list[Action]]:
     """The same session with another noise of rotations."""
-    omega = np.diag([100.0, 100.0, sigma_rotation**-2])
+    omega = block_isotropic(0.1, sigma_rotation)
     graph, actions = session(6)
     return PoseGraph(graph.poses, graph.edges, None, omega), [
         Action(action.poses, action.edges, omega, cost=action.cost) for action in actions

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from graphs import SPANNING_TREES, bundle, connected_topologies, cycle, noises, path, petersen
 from references import LOG_2_PI_E
 from topobelief.errors import DisconnectedGraphError, IllConditionedError, InvalidGraphError
+from topobelief.graph.information import block_isotropic
 from topobelief.graph.topology import Topology
 from topobelief.signatures.spanning_trees import log_num_spanning_trees, spanning_tree_signature
 
@@ -163,7 +164,7 @@ def test_one_node_has_no_uncertainty():
 
 def test_petersen_with_the_papers_noise():
     sigma_p, sigma_theta = 0.1, 0.035
-    omega = np.diag([sigma_p**-2, sigma_p**-2, sigma_theta**-2])
+    omega = block_isotropic(sigma_p, sigma_theta)
     expected = 1.5 * math.log(2000) + 4.5 * (
         -4 * math.log(sigma_p) - 2 * math.log(sigma_theta) - 3 * math.log(2 * math.pi * math.e)
     )

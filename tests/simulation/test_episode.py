@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from data_files import case_file
-from topobelief.experiments.scenario_file import scenario_of
 from topobelief.simulation.episode import Episode, achieved_entropy
 from topobelief.simulation.lidar import LidarSettings
 from topobelief.simulation.metrics import run_metrics, trajectory_error
@@ -17,6 +16,7 @@ from topobelief.simulation.noise import InjectedNoise
 from topobelief.simulation.record import ARRIVED, INTERRUPTED, History, KeyPoses, Record, RunOptions
 from topobelief.simulation.robot_settings import RobotSettings
 from topobelief.simulation.scenario import Goal, Scenario
+from topobelief.simulation.scenario_file import scenario_of
 from topobelief.world import World
 
 WALLS = [(3, 3, 3.4, 6.5), (3, 3, 6, 3.4), (7.6, 0, 8, 2.2), (9.6, 5.4, 12, 5.8), (6, 6.4, 6.4, 10), (10, 8, 10.5, 8.5)]

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 from topobelief.cli.plan_files import write_together
 from topobelief.errors import FileError
 from topobelief.experiments.strategy_comparison import ComparisonTask, played, read_runs, write_runs
 from topobelief.io.files import read_text, write_text
+from topobelief.io.json_values import without_nan
 from topobelief.report.canvas import save_figure
 from topobelief.report.simulation_figures import draw_comparison
 from topobelief.simulation.comparison import ComparedRun, summarised
@@ -56,8 +55,8 @@ def document(task: ComparisonTask, runs: list[ComparedRun]) -> dict[str, object]
     found = summarised(runs, baseline=task.strategies[0])
     return {
         "task": task.described(),
-        "strategies": [_plain(asdict(each)) for each in found],
-        "runs": [_plain(asdict(run)) for run in runs],
+        "strategies": [without_nan(asdict(each)) for each in found],
+        "runs": [without_nan(asdict(run)) for run in runs],
     }
 
 
@@ -72,7 +71,3 @@ def write(folder: Path, task: ComparisonTask, runs: list[ComparedRun]) -> None:
             "comparison.png": lambda path: save_figure(figure, path),
         },
     )
-
-
-def _plain(values: dict[str, Any]) -> dict[str, object]:
-    return {name: None if isinstance(value, float) and not math.isfinite(value) else value for name, value in values.items()}

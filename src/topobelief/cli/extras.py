@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 
-from topobelief.errors import InvalidInputError
+from topobelief.optional import missing_packages
 
 _PACKAGES = {
     "fast": ("numba",),
     "gtsam": ("gtsam",),
     "sim": ("gtsam", "mujoco", "small_gicp"),
     "page": ("plotly",),
+    "view": ("foxglove",),
 }
 
 
@@ -22,8 +23,6 @@ def require_extras(*extras: str) -> None:
     InvalidInputError
         Names the packages that are missing and what to install.
     """
-    missing = [package for extra in extras for package in _PACKAGES[extra] if find_spec(package) is None]
-    if missing:
-        raise InvalidInputError(
-            f"expected {' and '.join(missing)} to be installed, got none; run pip install 'topobelief[{','.join(extras)}]'"
-        )
+    absent = [package for extra in extras for package in _PACKAGES[extra] if find_spec(package) is None]
+    if absent:
+        raise missing_packages(absent, extras)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
@@ -22,6 +21,7 @@ from topobelief.cli.plan import GivenStart
 from topobelief.errors import FileError
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.files import atomic_file
+from topobelief.io.json_values import without_nan
 from topobelief.planning.decision import Decision
 from topobelief.world import World
 
@@ -67,7 +67,7 @@ def document(result: PlanResult) -> dict[str, object]:
     decision, graph, start = result.decision, result.graph, result.start
     best = result.candidates.paths[decision.best]
     plain = decision.to_dict()
-    exact = [value if math.isfinite(value) else None for value in result.entropies.tolist()]
+    exact = without_nan(result.entropies.tolist())
     described = zip(plain["actions"], result.candidates.paths, exact, strict=True)
     actions = [{**action, "waypoints": path.tolist(), "exact_for_comparison": value} for action, path, value in described]
     return {
@@ -91,11 +91,9 @@ def document(result: PlanResult) -> dict[str, object]:
 
 def _plain(value: object) -> object:
     """For JSON: None for no limit, text for paths, lists for arrays."""
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
     if isinstance(value, np.ndarray):
         return value.tolist()
-    return str(value) if isinstance(value, Path | GivenStart) else value
+    return str(value) if isinstance(value, Path | GivenStart) else without_nan(value)
 
 
 def write(folder: Path, result: PlanResult, reporter: Reporter) -> None:

@@ -18,6 +18,7 @@ from topobelief.cli.prior import read_prior
 from topobelief.errors import FileError, InvalidInputError, PlanningError, TopobeliefError
 from topobelief.graph.action import Action
 from topobelief.graph.fit import misfit
+from topobelief.graph.information import block_isotropic
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io import floor_plan
 from topobelief.io.reading import ReadingOptions
@@ -50,7 +51,7 @@ def information(sigma_p: float | None, sigma_theta: float | None) -> FloatArray 
         return None
     if sigma_p is None or sigma_theta is None:
         raise InvalidInputError("expected both --sigma-p and --sigma-theta or neither, got one; give both")
-    return np.diag([sigma_p**-2, sigma_p**-2, sigma_theta**-2])
+    return block_isotropic(sigma_p, sigma_theta)
 
 
 def read_graph(path: Path, reporter: Reporter, *, optimized: bool, reading: ReadingOptions) -> PoseGraph:

@@ -68,12 +68,12 @@ def simulate(
         from topobelief.cli.interruption import stop_on_interrupt
         from topobelief.cli.plan_files import checked_folder
         from topobelief.errors import InvalidInputError
-        from topobelief.experiments.scenario_file import scenario_of, with_detour
         from topobelief.report.simulation_tables import leg_line, metrics_table
         from topobelief.simulation.episode import Episode
         from topobelief.simulation.noise import parse_noise
         from topobelief.simulation.record import INTERRUPTED, RunOptions
         from topobelief.simulation.results import read_history, run_document
+        from topobelief.simulation.scenario_file import scenario_of, with_detour
         from topobelief.strategies.registry import checked_strategy
 
         if displaced and not resume:
@@ -90,7 +90,8 @@ def simulate(
         )
         folder = out or Path("out") / place.name
         checked_folder(folder)
-        simulation_files.require_recorder(recording)
+        if recording:
+            require_extras("view")
         history = read_history(folder, scenario=place.name, options=options) if resume else None
     with reporter.stage("driving") as update, stop_on_interrupt() as should_stop:
         files = simulation_files.RunFiles(folder, keep=resume)
@@ -153,12 +154,12 @@ def simulate_compare(
         from topobelief.cli import comparison_files
         from topobelief.cli.plan_files import checked_folder
         from topobelief.errors import InvalidInputError
-        from topobelief.experiments.scenario_file import scenario_of
         from topobelief.experiments.strategy_comparison import ComparisonTask
         from topobelief.report.simulation_tables import comparison_table
         from topobelief.simulation.comparison import summarised
         from topobelief.simulation.noise import parse_noise
         from topobelief.simulation.record import RunOptions
+        from topobelief.simulation.scenario_file import scenario_of
         from topobelief.strategies.registry import checked_strategy
 
         names = tuple(dict.fromkeys(checked_strategy(name.strip()) for name in strategies.split(",")))

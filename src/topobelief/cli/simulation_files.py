@@ -2,29 +2,13 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from pathlib import Path
 
 from topobelief.cli.plan_files import write_together
-from topobelief.errors import InvalidInputError
 from topobelief.simulation.record import Record
 from topobelief.simulation.results import writers
 
 _STALE = ("leg-*.json", "leg-*.png", "run.png", "run.mcap")
-
-
-def require_recorder(wanted: bool) -> None:
-    """Before any work is done for it.
-
-    Raises
-    ------
-    InvalidInputError
-        Where a recording is wanted and the extra is missing.
-    """
-    if wanted and find_spec("foxglove") is None:
-        raise InvalidInputError(
-            "expected foxglove-sdk to be installed for --recording, got none; run pip install 'topobelief[view]'"
-        )
 
 
 class RunFiles:

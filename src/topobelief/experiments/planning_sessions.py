@@ -21,6 +21,7 @@ from topobelief.candidates.polyline import path_length
 from topobelief.candidates.propose import CandidateRule, Routes, find_routes, predict_candidates
 from topobelief.candidates.roadmap import Roadmap
 from topobelief.graph.action import Action, posterior
+from topobelief.graph.information import block_isotropic
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.planner import Planner
 from topobelief.simulation.scenario import Goal, Place, named_scenario
@@ -117,9 +118,9 @@ class ActionRow:
     anchored_upper: float
 
 
-def block_isotropic(xi: float) -> FloatArray:
+def session_information(xi: float) -> FloatArray:
     """Information of every edge of a session, shape (3, 3)."""
-    return np.diag([SIGMA_POSITION**-2, SIGMA_POSITION**-2, (xi * SIGMA_POSITION) ** -2])
+    return block_isotropic(SIGMA_POSITION, xi * SIGMA_POSITION)
 
 
 def office_session(name: SessionName, seed: int, xi: float, *, num_paths: int | None = None) -> PlanningSession:
@@ -143,7 +144,7 @@ def office_session(name: SessionName, seed: int, xi: float, *, num_paths: int | 
     scenario = named_scenario("office")
     first, second = scenario.goals
     start = np.array([scenario.start])
-    information = block_isotropic(xi)
+    information = session_information(xi)
     graph = PoseGraph(start, np.zeros((0, 2), dtype=np.int64), None, information)
     if name == "S1":
         return _session("S1", seed, xi, graph, scenario.world, scenario.start[:2], first, num_paths)
@@ -157,7 +158,7 @@ def _session(
     name: SessionName, seed: int, xi: float, graph: PoseGraph, world: World, start: Place, goal: Goal, num_paths: int | None
 ) -> PlanningSession:
     routes = _routes(seed, start, goal.place, goal.num_paths if num_paths is None else num_paths)
-    found = predict_candidates(graph, world, routes, replace(_RULE, information=block_isotropic(xi)))
+    found = predict_candidates(graph, world, routes, replace(_RULE, information=session_information(xi)))
     return PlanningSession(name, seed, xi, world, routes.roadmap, goal.place, graph, tuple(found.paths), tuple(found.actions))
 
 

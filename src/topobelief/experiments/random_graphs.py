@@ -20,7 +20,7 @@ from scipy.spatial import KDTree
 from topobelief.arrays import FloatArray, IntArray
 from topobelief.entropy import joint_entropy
 from topobelief.experiments.benchmark.baselines import baselines
-from topobelief.experiments.planning_sessions import block_isotropic
+from topobelief.experiments.planning_sessions import session_information
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.signatures.spanning_trees import spanning_tree_signature
@@ -80,7 +80,7 @@ def random_graph(num_poses: int, degree_increase: float, *, rng: np.random.Gener
     odometry = np.column_stack([np.arange(num_poses - 1), np.arange(1, num_poses)])
     pairs = _near_pairs(poses[:, :2], round(degree_increase * num_poses / 2))
     closures = rng.choice(pairs, round(degree_increase * num_poses / 2), replace=False)
-    return PoseGraph(poses, np.concatenate([odometry, closures]), None, block_isotropic(XI))
+    return PoseGraph(poses, np.concatenate([odometry, closures]), None, session_information(XI))
 
 
 def random_graph_row(

@@ -13,10 +13,10 @@ from multiprocessing import get_context
 from pathlib import Path
 
 from topobelief.errors import FileError, InvalidInputError
-from topobelief.experiments.scenario_file import scenario_of, with_detour
 from topobelief.io.files import StrPath, read_text, write_text
 from topobelief.simulation.comparison import ComparedRun, compared_records, compared_run
 from topobelief.simulation.record import RunOptions
+from topobelief.simulation.scenario_file import scenario_of, with_detour
 
 _READERS: dict[str, Callable[[str], object]] = {"int": int, "str": str, "float": float}  # by annotation
 

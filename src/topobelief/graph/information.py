@@ -31,6 +31,35 @@ def tangent_split(tangent_dim: int) -> tuple[int, int]:
     return _SPLITS[tangent_dim]
 
 
+def block_isotropic(sigma_position: float, sigma_rotation: float, *, tangent_dim: int = 3) -> FloatArray:
+    """Information matrix of independent noise, the same along all axes of position and about all axes of rotation.
+
+    Parameters
+    ----------
+    sigma_position, sigma_rotation
+        Standard deviations, metres and radians.
+    tangent_dim
+        3 in SE(2), 6 in SE(3).
+
+    Returns
+    -------
+    FloatArray, shape (tangent_dim, tangent_dim)
+        diag(sigma_position^-2, ..., sigma_rotation^-2, ...), in tangent order (translation, rotation).
+
+    Raises
+    ------
+    InvalidGraphError
+        Where tangent_dim is neither 3 nor 6.
+
+    Examples
+    --------
+    >>> block_isotropic(0.5, 0.25).diagonal().tolist()
+    [4.0, 4.0, 16.0]
+    """
+    num_positions, num_rotations = tangent_split(tangent_dim)
+    return np.diag([sigma_position**-2] * num_positions + [sigma_rotation**-2] * num_rotations)
+
+
 def checked_information(information: ArrayLike, *, num_edges: int, tangent_dim: int) -> FloatArray:
     """Information matrices of shape (num_edges, kappa, kappa), read-only, exactly symmetric; one is shared by all edges.
 

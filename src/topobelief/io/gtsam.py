@@ -7,7 +7,6 @@ is: the two agree to first order, so information matrices, log-determinants and 
 
 from __future__ import annotations
 
-import importlib
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from topobelief.arrays import FloatArray
 from topobelief.errors import InvalidInputError
 from topobelief.geometry import SE2_GROUP, group_of_size
 from topobelief.graph.pose_graph import PoseGraph
+from topobelief.optional import load
 
 _ROTATION_FIRST = np.array([3, 4, 5, 0, 1, 2])  # its own inverse
 
@@ -121,10 +121,7 @@ def from_gtsam(factors: Any, values: Any) -> PoseGraph:
 
 def load_gtsam() -> Any:
     """GTSAM, whose bindings carry no usable types; loaded when first used."""
-    try:
-        return importlib.import_module("gtsam")
-    except ModuleNotFoundError:
-        raise InvalidInputError("expected GTSAM to be installed, got none; run pip install 'topobelief[gtsam]'") from None
+    return load("gtsam", "gtsam")
 
 
 def _require_factors_and_values(gtsam: Any, factors: Any, values: Any) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from topobelief.arrays import FloatArray, IntArray, ReadOnlyArrays, frozen_floats, frozen_ints
 from topobelief.errors import InvalidInputError
+from topobelief.io.json_values import without_nan
 
 SCHEMA = "topobelief.decision/2"
 
@@ -165,7 +166,7 @@ class Decision(ReadOnlyArrays):
             "signature": self.signature,
             "bounds": self.bounds,
             "determinant": self.determinant,
-            "error_bound": _json_number(self.error_bound),
+            "error_bound": without_nan(self.error_bound),
             "margin_met": self.margin_met,
             "num_evaluations": self.num_evaluations,
             "proven_optimal": self.proven_optimal,
@@ -179,10 +180,10 @@ class Decision(ReadOnlyArrays):
                     "num_closures": candidate.num_closures,
                     "length": candidate.length,
                     "cost": candidate.cost,
-                    "signature": _json_number(self.signatures[index]),
-                    "lower": _json_number(self.lower[index]),
-                    "upper": _json_number(self.upper[index]),
-                    "entropy": _json_number(self.entropies[index]),
+                    "signature": without_nan(self.signatures[index]),
+                    "lower": without_nan(self.lower[index]),
+                    "upper": without_nan(self.upper[index]),
+                    "entropy": without_nan(self.entropies[index]),
                 }
                 for index, candidate in enumerate(self.candidates)
             ],
@@ -238,10 +239,6 @@ class Decision(ReadOnlyArrays):
 def _readable(nats: float) -> str:
     """Two digits below ten, whole nats above a hundred."""
     return f"{nats:.0f}" if nats >= 100 else f"{nats:.1f}" if nats >= 1 else f"{nats:.2g}"
-
-
-def _json_number(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
 
 
 def _from_json(value: float | None, *, unknown: float) -> float:

@@ -28,6 +28,7 @@ from topobelief.graph.fit import warn_of_misfit
 from topobelief.graph.information import SAME_NOISE, shared_information
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.graph.topology import checked_anchor
+from topobelief.optional import missing_packages
 from topobelief.planning.batch import Batch, Criteria
 from topobelief.planning.decision import Decision
 from topobelief.planning.engine import Engine
@@ -118,9 +119,7 @@ class Planner:
         require_choice("bounds", bounds, (*BOUNDS, AUTO))
         require_choice("engine", engine, (*ENGINES, AUTO))
         if engine == "incremental" and not _has_kernels():
-            raise InvalidInputError(
-                "engine=\"incremental\" expects numba to be installed, got none; run pip install 'topobelief[fast]'"
-            )
+            raise missing_packages(["numba"], ["fast"])
         self._criteria = Criteria(objective, signature, bounds, BoundOptions(determinant, window), normalized)
         self._given_anchor, self._given_engine = anchor, engine
         self._allow_dense_spectrum = allow_dense_spectrum

@@ -5,7 +5,6 @@ Frames: `map` is the world, `base` the robot where it believes to be, `true_base
 
 from __future__ import annotations
 
-import importlib
 import math
 from os import PathLike
 from pathlib import Path
@@ -14,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from topobelief.arrays import FloatArray
-from topobelief.errors import InvalidInputError
+from topobelief.optional import load
 from topobelief.report import style
 from topobelief.simulation.record import Record
 from topobelief.simulation.scan import Scan
@@ -31,25 +30,18 @@ def write_recording(record: Record, path: str | PathLike[str]) -> None:
     InvalidInputError
         Where foxglove-sdk is not installed.
     """
-    sdk = _load_sdk()
+    sdk = load("foxglove", "view")
     context = sdk.Context()
     with sdk.open_mcap(Path(path), allow_overwrite=True, context=context):
         _Recorder(context).record(record)
-
-
-def _load_sdk() -> Any:
-    try:
-        return importlib.import_module("foxglove")
-    except ModuleNotFoundError:
-        raise InvalidInputError("expected foxglove-sdk to be installed, got none; run pip install 'topobelief[view]'") from None
 
 
 class _Recorder:
     """Channels, and what is written to them."""
 
     def __init__(self, context: Any) -> None:
-        self._m: Any = importlib.import_module("foxglove.messages")
-        channels: Any = importlib.import_module("foxglove.channels")
+        self._m: Any = load("foxglove.messages", "view")
+        channels: Any = load("foxglove.channels", "view")
         self._scene = {
             topic: channels.SceneUpdateChannel(topic, context=context) for topic in ("/world", "/graph", "/candidates")
         }

@@ -23,6 +23,7 @@ from scipy.stats import chi2
 from topobelief.arrays import FloatArray
 from topobelief.errors import InvalidInputError
 from topobelief.geometry import SE2_GROUP
+from topobelief.graph.information import block_isotropic
 from topobelief.simulation.factor import CLOSURE, ODOMETRY, Factor
 from topobelief.simulation.loop_closures import PairwiseConsistency, closure_candidates
 from topobelief.simulation.occupancy import OccupancyMap
@@ -111,13 +112,12 @@ class FrontEndSettings:
     @property
     def expected_information(self) -> FloatArray:
         """Of a factor among walls on all sides, shape (3, 3): the median of some 1400 matches in `office` and `lab`."""
-        return np.diag([_TYPICAL_POSITION**-2, _TYPICAL_POSITION**-2, _TYPICAL_ANGLE**-2])
+        return block_isotropic(_TYPICAL_POSITION, _TYPICAL_ANGLE)
 
     @property
     def gate_information(self) -> FloatArray:
         """What a closure is known by if its walls say nothing, shape (3, 3): it stays within the largest corrections."""
-        sigmas = np.array([self.max_correction, self.max_correction, self.max_turn_correction])
-        return np.diag(sigmas**-2)
+        return block_isotropic(self.max_correction, self.max_turn_correction)
 
 
 class _Track(NamedTuple):

@@ -10,14 +10,13 @@ Measured before choosing: cylinder wheels wander by themselves (0.7 rad in 41 m)
 
 from __future__ import annotations
 
-import importlib
 import math
 from typing import Any
 
 import numpy as np
 
 from topobelief.arrays import FloatArray
-from topobelief.errors import InvalidInputError
+from topobelief.optional import load
 from topobelief.simulation.robot_settings import RobotSettings
 from topobelief.simulation.walls import wall_segments
 from topobelief.world import World
@@ -42,10 +41,7 @@ def load_mujoco() -> Any:
     InvalidInputError
         Where it is not installed.
     """
-    try:
-        return importlib.import_module("mujoco")
-    except ModuleNotFoundError:
-        raise InvalidInputError("expected MuJoCo to be installed, got none; run pip install 'topobelief[sim]'") from None
+    return load("mujoco", "sim")
 
 
 def build_model(world: World | None, settings: RobotSettings) -> Any:

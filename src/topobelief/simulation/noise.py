@@ -14,6 +14,7 @@ import numpy as np
 from topobelief.arrays import FloatArray
 from topobelief.errors import InvalidInputError
 from topobelief.geometry import SE2_GROUP
+from topobelief.graph.information import block_isotropic
 from topobelief.simulation.factor import Factor
 
 PHYSICAL = "physical"
@@ -51,7 +52,7 @@ class InjectedNoise:
     @property
     def information(self) -> FloatArray:
         """Shape (3, 3)."""
-        return np.diag([self.sigma_p**-2, self.sigma_p**-2, self.sigma_theta**-2])
+        return block_isotropic(self.sigma_p, self.sigma_theta)
 
     def disturbed(self, measurements: FloatArray, *, rng: np.random.Generator) -> FloatArray:
         """Measurements with noise, shape (..., 3)."""

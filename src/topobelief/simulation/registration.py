@@ -14,7 +14,6 @@ holds for a singular A too: a direction in which walls say nothing gets no infor
 
 from __future__ import annotations
 
-import importlib
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -24,7 +23,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from topobelief.arrays import FloatArray, IntArray
-from topobelief.errors import InvalidInputError
+from topobelief.optional import load
 from topobelief.simulation.scan import Scan
 
 _LEVELS = (-0.1, 0.0, 0.1)  # m
@@ -269,7 +268,4 @@ def load_small_gicp() -> Any:
     InvalidInputError
         Where it is not installed.
     """
-    try:
-        return importlib.import_module("small_gicp")
-    except ModuleNotFoundError:
-        raise InvalidInputError("expected small_gicp to be installed, got none; run pip install 'topobelief[sim]'") from None
+    return load("small_gicp", "sim")

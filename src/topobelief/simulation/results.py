@@ -29,6 +29,7 @@ from topobelief.arrays import FloatArray
 from topobelief.errors import FileError
 from topobelief.io.files import StrPath, read_text
 from topobelief.io.g2o import write_g2o
+from topobelief.io.json_values import without_nan
 from topobelief.simulation.metrics import chained, run_metrics
 from topobelief.simulation.noise import InjectedNoise
 from topobelief.simulation.record import Deliberation, History, KeyPoses, Leg, Record, RunOptions
@@ -70,8 +71,8 @@ def run_document(record: Record) -> dict[str, object]:
             "noise": None if options.noise is None else [options.noise.sigma_p, options.noise.sigma_theta],
         },
         "outcome": record.outcome,
-        "metrics": {name: _plain(value) for name, value in run_metrics(record).items()},
-        "legs": [{name: _plain(value) for name, value in asdict(leg).items()} for leg in record.legs],
+        "metrics": {name: without_nan(value) for name, value in run_metrics(record).items()},
+        "legs": [{name: without_nan(value) for name, value in asdict(leg).items()} for leg in record.legs],
     }
 
 
@@ -168,7 +169,7 @@ def _deliberation(each: Deliberation) -> dict[str, object]:
         "candidates": [
             {
                 "length": length,
-                "entropy": _plain(entropy),
+                "entropy": without_nan(entropy),
                 "num_new_poses": action.num_new_poses,
                 "num_closures": len(action.edges) - action.num_new_poses,
                 "waypoints": path.tolist(),
@@ -188,10 +189,6 @@ def _csv(header: list[str], rows: list[list[object]]) -> str:
     writer.writerow(header)
     writer.writerows(rows)
     return text.getvalue()
-
-
-def _plain(value: object) -> object:
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _number(value: object) -> Any:

@@ -9,18 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from topobelief.arrays import FloatArray
 from topobelief.experiments.benchmark.sessions import ClosureStyle, candidate_paths, city_drive
+from topobelief.graph.information import block_isotropic
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.decision import Decision
 from topobelief.planning.planner import Planner
 
 FAMILIES = ("paper", "fischer", "anchored", "chain")
-
-
-def block_isotropic(sigma_position: float, sigma_rotation: float) -> FloatArray:
-    """Information matrix of SE(2) measurements with these standard deviations, metres and radians; shape (3, 3)."""
-    return np.diag([sigma_position**-2, sigma_position**-2, sigma_rotation**-2])
 
 
 def with_noise(graph: PoseGraph, sigma_position: float, sigma_rotation: float) -> PoseGraph:

@@ -10,8 +10,8 @@ from typing import Literal, get_args
 import numpy as np
 
 from topobelief.errors import InvalidInputError, require_choice
-from topobelief.experiments.benchmark.certificates import block_isotropic
 from topobelief.experiments.benchmark.sessions import candidate_paths, city_drive
+from topobelief.graph.information import block_isotropic
 from topobelief.planning.planner import Planner
 
 Work = Literal["nothing", "bounds", "exact"]

@@ -19,13 +19,13 @@ from topobelief.estimation import optimize
 from topobelief.experiments.benchmark.certificates import (
     ErrorBounds,
     ProofSize,
-    block_isotropic,
     error_bounds,
     proof_size,
 )
 from topobelief.experiments.benchmark.memory import peak_gigabytes
 from topobelief.experiments.benchmark.sessions import BenchmarkSession, ClosureStyle, candidate_paths, city_drive
 from topobelief.experiments.benchmark.timing import SessionTimes, degree_seconds, time_session
+from topobelief.graph.information import block_isotropic
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.formats import read_pose_graph
 

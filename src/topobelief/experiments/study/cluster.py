@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
-from importlib import import_module
 from importlib.metadata import version
 from typing import Any
 from uuid import uuid4
@@ -13,6 +12,7 @@ from uuid import uuid4
 from topobelief.errors import InvalidInputError, TopobeliefError
 from topobelief.experiments.study.attempt import Finished, Outcome, Play, attempt, with_second_chance
 from topobelief.experiments.study.tasks import Task
+from topobelief.optional import load
 
 _PATIENCE = 15  # seconds to wait for the scheduler, and for its first worker
 _DEATH = "WorkerDiedError: several workers of the cluster died over it, the last ones when nothing else was running"
@@ -39,7 +39,7 @@ class Cluster:
 
     def __init__(self, address: str) -> None:
         self.address = address
-        self._distributed = _distributed()
+        self._distributed = load("distributed", "cluster")
 
     def run(self, play: Play, tasks: Sequence[Task]) -> Generator[Finished]:
         """Play all tasks and give each once, as they finish; closing it early withdraws the rest.
@@ -150,12 +150,3 @@ def _own_version() -> str:
 
 def _shown(found: object) -> str:
     return found if isinstance(found, str) else "none"
-
-
-def _distributed() -> Any:
-    try:
-        return import_module("distributed")
-    except ImportError:
-        raise InvalidInputError(
-            "a scheduler expects distributed to be installed, got none; run pip install 'topobelief[cluster]'"
-        ) from None

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterable
 from contextlib import contextmanager
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from topobelief.errors import FileError, InvalidInputError
+from topobelief.errors import FileError
 from topobelief.experiments.study.rows import COLUMNS, KEY, UNREPEATABLE, ColumnType
 from topobelief.experiments.study.session import Row
 from topobelief.experiments.study.tasks import Task
 from topobelief.io.files import atomic_file
+from topobelief.optional import load
 
 ROWS_PER_FILE = 128
 
@@ -41,7 +41,7 @@ class Dataset:
     """
 
     def __init__(self, folder: Path) -> None:
-        self._arrow = _pyarrow()
+        self._arrow = load("pyarrow", "study")
         self._folder = folder / "rows"
         self._files: dict[Path, list[Row]] = {}  # those with room
         self._status: dict[str, str] = {}
@@ -124,7 +124,7 @@ class Dataset:
             raise FileError(self._folder, f"expected a folder to write to, got: {error.strerror}") from None
         table = self._arrow.Table.from_pylist(rows, schema=_schema(self._arrow))
         with atomic_file(path) as temporary:
-            import_module("pyarrow.parquet").write_table(table, temporary)
+            load("pyarrow.parquet", "study").write_table(table, temporary)
         self._next = max(self._next, 1 + int(path.stem.rpartition("-")[2]))
         if len(rows) < ROWS_PER_FILE:
             self._files[path] = rows
@@ -140,7 +140,7 @@ def read_table(folder: Path) -> Table:
     FileError
         If the folder holds no study.
     """
-    arrow = _pyarrow()
+    arrow = load("pyarrow", "study")
     paths = sorted((folder / "rows").glob("[!.]*.parquet"))
     if not paths:
         raise FileError(folder, "expected the folder of a study, got one without rows/*.parquet")
@@ -190,7 +190,7 @@ def _locked(descriptor: int) -> bool:
 
 def _read(path: Path, arrow: Any) -> Table:
     try:
-        table = import_module("pyarrow.parquet").read_table(path, partitioning=None)
+        table = load("pyarrow.parquet", "study").read_table(path, partitioning=None)
     except (OSError, arrow.ArrowInvalid) as error:
         raise FileError(path, f"expected a Parquet file, got: {' '.join(str(error).split())}") from None
     if not table.schema.equals(_schema(arrow)):
@@ -207,12 +207,3 @@ def _schema(arrow: Any) -> Any:
         "numbers": arrow.list_(arrow.float64()),
     }
     return arrow.schema([(name, types[kind]) for name, kind in COLUMNS.items()])
-
-
-def _pyarrow() -> Any:
-    try:
-        return import_module("pyarrow")
-    except ImportError:
-        raise InvalidInputError(
-            "a study expects pyarrow to be installed, got none; run pip install 'topobelief[study]'"
-        ) from None

@@ -18,6 +18,7 @@ from topobelief.bounds.entropy_bounds import Determinant
 from topobelief.candidates.propose import CandidateRule
 from topobelief.errors import FileError
 from topobelief.estimation import optimize
+from topobelief.graph.information import block_isotropic
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.files import StrPath
 from topobelief.io.floor_plan import read_world
@@ -49,7 +50,7 @@ class Noise:
     @property
     def information(self) -> FloatArray:
         """Shape (3, 3)."""
-        return np.diag([self.sigma_p**-2, self.sigma_p**-2, self.sigma_theta**-2])
+        return block_isotropic(self.sigma_p, self.sigma_theta)
 
 
 @dataclass(frozen=True, slots=True)

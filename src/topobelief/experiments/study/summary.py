@@ -8,13 +8,13 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
+from scipy import stats
 
 from topobelief.arrays import FloatArray
 from topobelief.experiments.study.dataset import Table
 from topobelief.experiments.study.session import Row
 
 _GROUP = ("world", "session", "objective", "xi", "sigma_p", "sigma_theta", "strategy")
-_Z = 1.959963984540054  # 95 % of a normal distribution lie within
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,10 +52,8 @@ class Share:
         """Of `total` cases of which `count` are so."""
         if total == 0:
             return cls(math.nan, math.nan, math.nan)
-        p, scale = count / total, 1 + _Z**2 / total
-        centre = (p + _Z**2 / (2 * total)) / scale
-        half = _Z * math.sqrt(p * (1 - p) / total + _Z**2 / (4 * total**2)) / scale
-        return cls(p, max(0.0, centre - half), min(1.0, centre + half))
+        interval = stats.binomtest(count, total).proportion_ci(method="wilson")
+        return cls(count / total, float(interval.low), float(interval.high))
 
 
 @dataclass(frozen=True, slots=True)

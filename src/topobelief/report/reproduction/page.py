@@ -11,20 +11,20 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from html import escape
-from importlib import import_module
 from importlib.resources import files
 from string import Template
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from shapely import MultiPolygon
 
 from topobelief.arrays import FloatArray
 from topobelief.candidates.polyline import subdivided
-from topobelief.errors import InvalidInputError
 from topobelief.experiments.claims import Claim
 from topobelief.experiments.planning_sessions import NOISES, SESSIONS, PlanningSession, cases, office_session
 from topobelief.experiments.reproduction import Reproduction
+from topobelief.io.json_values import without_nan
+from topobelief.optional import load
 from topobelief.report.reproduction.figures import NamedFigure
 
 TITLE = "Topological belief space planning, reproduced"
@@ -165,28 +165,13 @@ def _rounded(points: FloatArray) -> list[Any]:
 
 def _json(document: Mapping[str, Any]) -> str:
     """JSON that may stand in a script element."""
-    text = json.dumps(_finite(document), allow_nan=False, separators=(",", ":"))
+    text = json.dumps(without_nan(document), allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
-
-
-def _finite(value: Any) -> Any:
-    """None for what JSON lacks."""
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, dict):
-        return {name: _finite(each) for name, each in cast("dict[str, Any]", value).items()}
-    if isinstance(value, list):
-        return [_finite(each) for each in cast("list[Any]", value)]
-    return value
 
 
 def _plotly() -> str:
     """plotly's script, whole."""
-    try:
-        offline: Any = import_module("plotly.offline")  # ships no types
-    except ImportError:
-        raise InvalidInputError("expected plotly to be installed, got none; run pip install 'topobelief[page]'") from None
-    return offline.get_plotlyjs()
+    return load("plotly.offline", "page").get_plotlyjs()
 
 
 def _text(name: str) -> str:

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from topobelief.errors import FileError, InvalidInputError
-from topobelief.experiments.scenario_file import scenario_of, with_detour
 from topobelief.simulation.scenario import Goal
+from topobelief.simulation.scenario_file import scenario_of, with_detour
 
 GOOD = """map: walls.csv
 start: [1, 1, 0.5]
