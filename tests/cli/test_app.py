@@ -71,6 +71,11 @@ print(sorted({"numpy", "scipy", "matplotlib", "gtsam", "shapely", "PIL", "qdldl"
     assert result.stdout.strip() == "[]"
 
 
+def test_the_package_runs_as_a_module():
+    result = subprocess.run([sys.executable, "-m", "topobelief", "--version"], capture_output=True, text=True, check=True)
+    assert version("topobelief") in result.stdout
+
+
 def test_the_entry_point_exits_with_the_code(capsys):
     with pytest.raises(SystemExit) as exit_info:
         main(["info", "nowhere.g2o"])

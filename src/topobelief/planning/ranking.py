@@ -24,6 +24,7 @@ times smaller.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Hashable, Sequence
 
 import numpy as np
@@ -43,8 +44,19 @@ def ranking_of(signatures: FloatArray, costs: FloatArray) -> IntArray:
 
 def first_alike(actions: Sequence[Action]) -> IntArray:
     """For each action, the first with the same poses, edges and information, shape (K,); labels and costs may differ."""
+    outlines = [_outline(action) for action in actions]
+    count = Counter(outlines)
     first: dict[Hashable, int] = {}
-    return np.array([first.setdefault(_content(action), index) for index, action in enumerate(actions)], dtype=np.int64)
+    places = [
+        index if count[outline] == 1 else first.setdefault(_content(action), index)
+        for index, (action, outline) in enumerate(zip(actions, outlines, strict=True))
+    ]
+    return np.array(places, dtype=np.int64)
+
+
+def _outline(action: Action) -> Hashable:
+    """What equal actions have in common and most others do not: cheap to compare."""
+    return len(action.edges), action.poses.shape, *(action.poses[-1].tolist() if len(action.poses) else ())
 
 
 def _content(action: Action) -> Hashable:

@@ -117,7 +117,7 @@ class _Shift:
                         self._finished.put(Finished(task, process.ask(self._play, task), number))
                         break
                     except WorkerDiedError as error:
-                        self._bury(process)
+                        self._discard(process)
                         process, death = None, str(error)
                 else:
                     failed = Outcome(None, f"WorkerDiedError: {death}", worker_died=True)
@@ -126,7 +126,7 @@ class _Shift:
             self._finished.put(error)
         finally:
             if process is not None:
-                self._bury(process)
+                self._discard(process)
 
     def _next_task(self) -> Task | None:
         with self._lock:
@@ -145,11 +145,11 @@ class _Shift:
                 process.await_ready()
                 return process
             except WorkerDiedError as error:
-                self._bury(process)
+                self._discard(process)
                 death = str(error)
         raise WorkerDiedError(f"expected worker processes that start, got: {death}")
 
-    def _bury(self, process: _WorkerProcess) -> None:
+    def _discard(self, process: _WorkerProcess) -> None:
         with self._lock:
             self._processes.discard(process)
         process.close()
