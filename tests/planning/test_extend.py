@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -107,6 +110,19 @@ def test_a_graph_that_cannot_be_planned_on_leaves_the_planner_as_it_was():
     actions = candidate_paths(graph, 2, num_new_poses=5, num_closures=2, rng=np.random.default_rng(0))
     assert planner.graph is graph
     assert_same_decisions(planner, Planner(graph), actions)
+
+
+def test_a_planner_that_is_extended_again_and_again_keeps_one_earlier_graph_only():
+    graph, rng = city_drive(60, block_isotropic(0.1, 0.035), rng=np.random.default_rng(8)), np.random.default_rng(0)
+    planner, graphs = Planner(graph, engine="incremental"), [weakref.ref(graph)]
+    for _ in range(4):
+        actions = candidate_paths(graph, 2, num_new_poses=5, num_closures=2, rng=rng)
+        planner.decide(actions)
+        graph = posterior(graph, actions[0])
+        planner = planner.extended(graph)
+        graphs.append(weakref.ref(graph))
+    gc.collect()
+    assert [each() is not None for each in graphs] == [False, False, False, True, True]
 
 
 @pytest.mark.parametrize(("poses_move", "least"), [(False, 0.75), (True, 0.0)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 
@@ -42,7 +43,13 @@ class PriorFactors:
         self._bases: dict[int, EliminationTree] = {}  # of the trees that keep an order
         self._factors: dict[tuple[FormName, float], FormFactor] = {}
         self._best: dict[tuple[FormName, float], FormFactor] = {}
-        self._earlier = earlier
+        self._earlier = None if earlier is None else earlier._without_earlier()
+
+    def _without_earlier(self) -> PriorFactors:
+        """The same without those that they came from, so that a graph that grows again and again does not keep them all."""
+        alone = copy(self)
+        alone._earlier = None
+        return alone
 
     @property
     def edges(self) -> IntArray:
