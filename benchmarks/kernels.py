@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from topobelief.experiments.benchmark.certificates import block_isotropic
-from topobelief.experiments.benchmark.sessions import candidate_paths, city_drive
+from topobelief.benchmark.certificates import block_isotropic
+from topobelief.benchmark.sessions import candidate_paths, city_drive
 from topobelief.forms.action_batch import ActionBatch
 from topobelief.forms.degree_sums import DegreeSums
 from topobelief.graph.action import check_actions

@@ -7,7 +7,7 @@ import tempfile
 from functools import lru_cache
 from pathlib import Path
 
-from topobelief.experiments.reproduction import Reproduction, ReproductionPlan, reproduce
+from topobelief.reproduction.run import Reproduction, ReproductionPlan, reproduce
 
 SMALLEST = ReproductionPlan(
     num_seeds=1,

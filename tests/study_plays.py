@@ -8,8 +8,8 @@ import time
 from pathlib import Path
 
 from topobelief.errors import PlanningError
-from topobelief.experiments.study.session import Row
-from topobelief.experiments.study.tasks import Task
+from topobelief.study.session import Row
+from topobelief.study.tasks import Task
 
 
 def quick(task: Task) -> Row:

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from engines import DenseEngine, judge
 from graphs import SE2_GROUP, SE3_GROUP, Noise, random_action, random_pose_graph, sessions
+from topobelief.benchmark.sessions import candidate_paths, city_drive
 from topobelief.errors import InvalidInputError
-from topobelief.experiments.benchmark.sessions import candidate_paths, city_drive
 from topobelief.graph.information import block_isotropic
 from topobelief.planning.planner import Planner
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from topobelief import write_g2o
+from topobelief.benchmark.run import SCHEMA, BenchmarkPlan
+from topobelief.benchmark.sessions import city_drive
 from topobelief.cli.app import run
-from topobelief.experiments.benchmark.run import SCHEMA, BenchmarkPlan
-from topobelief.experiments.benchmark.sessions import city_drive
 from topobelief.graph.information import block_isotropic
 
 
@@ -62,7 +62,7 @@ def test_options_go_before_the_quick_plan_and_json_is_all_that_is_printed(tiny, 
 
 
 def test_an_interrupted_benchmark_leaves_what_it_has(tiny, tmp_path, monkeypatch, capsys):
-    from topobelief.experiments.benchmark import run as module
+    from topobelief.benchmark import run as module
 
     def interrupt(*_, **__):
         raise KeyboardInterrupt

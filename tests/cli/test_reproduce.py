@@ -9,8 +9,8 @@ import pytest
 
 from reproductions import SMALLEST, copy_of_smallest_reproduction
 from topobelief.cli.app import run
-from topobelief.experiments import reproduction
-from topobelief.experiments.reproduction import ReproductionPlan
+from topobelief.reproduction import run as reproduction
+from topobelief.reproduction.run import ReproductionPlan
 
 
 @pytest.fixture

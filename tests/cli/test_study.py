@@ -21,8 +21,8 @@ from PIL import Image
 from topobelief.cli import app, study_progress
 from topobelief.cli.app import BAD_INPUT
 from topobelief.cli.study_progress import StudyProgress, description
-from topobelief.experiments.study import runner
-from topobelief.experiments.study.dataset import read_table, repeatable
+from topobelief.study import runner
+from topobelief.study.dataset import read_table, repeatable
 
 KILLS = int(os.environ.get("TOPOBELIEF_KILLS", "2"))
 """How often a study is killed; set it higher to try harder."""

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from graphs import SE3_GROUP, Noise, random_action, random_pose_graph, sessions
+from topobelief.benchmark.sessions import candidate_paths, city_drive
 from topobelief.errors import DisconnectedGraphError
-from topobelief.experiments.benchmark.sessions import candidate_paths, city_drive
 from topobelief.graph.action import posterior
 from topobelief.graph.information import block_isotropic
 from topobelief.graph.pose_graph import PoseGraph

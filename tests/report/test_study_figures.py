@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from topobelief.experiments.study.summary import Share, Spread, Summary
 from topobelief.report.study_figures import FIGURES, draw_choices, draw_losses, draw_times
+from topobelief.study.summary import Share, Spread, Summary
 
 
 def summary(**changes) -> Summary:

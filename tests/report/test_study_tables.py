@@ -7,8 +7,8 @@ import math
 import numpy as np
 from rich.console import Console
 
-from topobelief.experiments.study.summary import Share, Spread, Summary
 from topobelief.report.study_tables import summary_table
+from topobelief.study.summary import Share, Spread, Summary
 
 
 def summary(strategy: str, losses: list[float], *, session: str = "S1", num_failed: int = 0) -> Summary:

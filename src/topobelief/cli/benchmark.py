@@ -45,8 +45,8 @@ def benchmark(
     require_extras("fast", "gtsam")
     reporter, folder = Reporter(as_json=as_json), checked_folder(out)
     with reporter.stage("start-up"):
+        from topobelief.benchmark.run import BenchmarkPlan, BenchmarkResult, run_benchmark
         from topobelief.errors import FileError
-        from topobelief.experiments.benchmark.run import BenchmarkPlan, BenchmarkResult, run_benchmark
         from topobelief.io.files import atomic_file
         from topobelief.report.benchmark_figure import draw_benchmark
         from topobelief.report.benchmark_tables import benchmark_tables

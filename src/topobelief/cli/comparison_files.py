@@ -9,12 +9,12 @@ from pathlib import Path
 
 from topobelief.cli.plan_files import write_together
 from topobelief.errors import FileError
-from topobelief.experiments.strategy_comparison import ComparisonTask, played, read_runs, write_runs
 from topobelief.io.files import read_text, write_text
 from topobelief.io.json_values import without_nan
 from topobelief.report.canvas import save_figure
 from topobelief.report.simulation_figures import draw_comparison
 from topobelief.simulation.comparison import ComparedRun, summarised
+from topobelief.simulation.strategy_comparison import ComparisonTask, played, read_runs, write_runs
 
 _TASK_FILE, _RUNS_FILE = "task.json", "comparison.csv"
 

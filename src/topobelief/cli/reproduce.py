@@ -40,9 +40,9 @@ def reproduce(
     with reporter.stage("start-up"):
         from topobelief.cli import reproduction_files
         from topobelief.cli.plan_files import checked_folder
-        from topobelief.experiments.reproduction import ReproductionPlan
-        from topobelief.experiments.reproduction import reproduce as run
         from topobelief.report.reproduction.claims_table import claims_table
+        from topobelief.reproduction.run import ReproductionPlan
+        from topobelief.reproduction.run import reproduce as run
 
     folder = out or Path("out") / ("reproduction-quick" if quick else "reproduction")
     checked_folder(folder)

@@ -7,12 +7,12 @@ from dataclasses import asdict
 from pathlib import Path
 
 from topobelief.cli.plan_files import write_together
-from topobelief.experiments.reproduction import Reproduction
 from topobelief.io.files import write_text
 from topobelief.report.canvas import save_figure
 from topobelief.report.reproduction.claims_table import claims_markdown
 from topobelief.report.reproduction.figures import figures_of
 from topobelief.report.reproduction.page import command, page
+from topobelief.reproduction.run import Reproduction
 
 SCHEMA = "topobelief.claims/1"
 

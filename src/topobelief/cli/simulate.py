@@ -154,12 +154,12 @@ def simulate_compare(
         from topobelief.cli import comparison_files
         from topobelief.cli.plan_files import checked_folder
         from topobelief.errors import InvalidInputError
-        from topobelief.experiments.strategy_comparison import ComparisonTask
         from topobelief.report.simulation_tables import comparison_table
         from topobelief.simulation.comparison import summarised
         from topobelief.simulation.noise import parse_noise
         from topobelief.simulation.record import RunOptions
         from topobelief.simulation.scenario_file import scenario_of
+        from topobelief.simulation.strategy_comparison import ComparisonTask
         from topobelief.strategies.registry import checked_strategy
 
         names = tuple(dict.fromkeys(checked_strategy(name.strip()) for name in strategies.split(",")))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from topobelief.experiments.study.attempt import Workers
+    from topobelief.study.attempt import Workers
 
 
 def study(
@@ -42,9 +42,9 @@ def study(
     with reporter.stage("start-up"):
         from topobelief.cli.plan_files import checked_folder
         from topobelief.cli.study_progress import StudyProgress
-        from topobelief.experiments.study.runner import run_study
-        from topobelief.experiments.study.specification import read_specification
-        from topobelief.experiments.study.tasks import tasks_of
+        from topobelief.study.runner import run_study
+        from topobelief.study.specification import read_specification
+        from topobelief.study.tasks import tasks_of
 
     folder = out or Path("out") / specification_file.stem
     checked_folder(folder)
@@ -74,10 +74,10 @@ def study(
 
 def _workers(num_workers: int | None, scheduler: str | None) -> Workers:
     if scheduler is not None:
-        from topobelief.experiments.study.cluster import Cluster
+        from topobelief.study.cluster import Cluster
 
         return Cluster(scheduler)
-    from topobelief.experiments.study.local_workers import LocalWorkers
+    from topobelief.study.local_workers import LocalWorkers
 
     return LocalWorkers(num_workers)
 
@@ -97,9 +97,9 @@ def study_report(
     with reporter.stage("start-up"):
         from topobelief.cli import study_files
         from topobelief.cli.plan_files import checked_folder
-        from topobelief.experiments.study.dataset import read_table
-        from topobelief.experiments.study.summary import summaries
         from topobelief.report.study_tables import summary_table
+        from topobelief.study.dataset import read_table
+        from topobelief.study.summary import summaries
 
     target = out or folder / "report"
     with reporter.stage("reading"):

@@ -9,9 +9,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from topobelief.cli.plan_files import write_together
-from topobelief.experiments.study.summary import Summary, flat
 from topobelief.report.canvas import save_figure
 from topobelief.report.study_figures import FIGURES
+from topobelief.study.summary import Summary, flat
 
 
 def write(folder: Path, found: Sequence[Summary]) -> list[str]:

@@ -9,7 +9,7 @@ from types import TracebackType
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from topobelief.experiments.study import runner
+from topobelief.study import runner
 
 _SECONDS_BETWEEN_LINES = 30.0
 

@@ -6,8 +6,8 @@ from typing import Any, cast
 
 from matplotlib.figure import Figure
 
-from topobelief.experiments.benchmark.run import BenchmarkResult
-from topobelief.experiments.benchmark.timing import MethodTime, SessionTimes
+from topobelief.benchmark.run import BenchmarkResult
+from topobelief.benchmark.timing import MethodTime, SessionTimes
 from topobelief.report import style
 
 _WIDTH, _HEIGHT = 7.2, 4.4  # inches

@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from rich import box
 from rich.table import Table
 
-from topobelief.experiments.benchmark.run import BenchmarkResult, ratio
-from topobelief.experiments.benchmark.timing import SessionTimes
+from topobelief.benchmark.run import BenchmarkResult, ratio
+from topobelief.benchmark.timing import SessionTimes
 
 
 def benchmark_tables(result: BenchmarkResult) -> Iterable[Table | str]:

@@ -15,9 +15,9 @@ import numpy as np
 from matplotlib.colors import LinearSegmentedColormap, to_hex
 from matplotlib.figure import Figure
 
-from topobelief.experiments.study.summary import Share, Spread, Summary
 from topobelief.report import style
 from topobelief.report.canvas import Canvas, Entry, Panel
+from topobelief.study.summary import Share, Spread, Summary
 
 _LEFT, _RIGHT, _TOP, _BOTTOM = 1.70, 0.25, 1.00, 0.85  # inches, as all lengths here
 _MARGIN, _LEAST_WIDTH = 0.25, 7.2

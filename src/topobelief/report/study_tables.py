@@ -10,8 +10,8 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from topobelief.experiments.study.summary import Summary
 from topobelief.report.tables import number
+from topobelief.study.summary import Summary
 
 _COLUMNS = ("best", "95 %", "loss", "90 % below", "rank", "exact", "ms", "seeds", "failed")
 

@@ -14,10 +14,10 @@ from typing import Any
 import pytest
 
 from reproductions import smallest_reproduction
-from topobelief.experiments.planning_sessions import cases
 from topobelief.report.canvas import save_figure
 from topobelief.report.reproduction.figures import NamedFigure, figures_of
 from topobelief.report.reproduction.page import page
+from topobelief.reproduction.planning_sessions import cases
 
 CHROMIUM = os.environ.get("TOPOBELIEF_CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
 FLAGS = [

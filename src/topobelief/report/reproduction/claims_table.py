@@ -8,7 +8,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from topobelief.experiments.claims import Claim
+from topobelief.reproduction.claims import Claim
 
 _SHARED = ("where", "holds if", "published")
 

@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from topobelief.arrays import FloatArray
-from topobelief.experiments.planning_sessions import NOISES, SESSIONS, ActionRow, cases
 from topobelief.planning.decision_quality import decision_quality
 from topobelief.report import style
 from topobelief.report.canvas import Entry, Panel
 from topobelief.report.reproduction.panels import MARGIN, SIGNATURE_LOOKS, Grid, light_grid, signed
+from topobelief.reproduction.planning_sessions import NOISES, SESSIONS, ActionRow, cases
 
 _LOOKS = (
     ("paper", "the paper's bounds", "#C9CDD2", 6.5),

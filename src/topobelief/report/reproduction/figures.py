@@ -8,15 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from topobelief.experiments.planning_sessions import NOISES, SESSIONS, cases, office_session
-from topobelief.experiments.reproduction import Reproduction
-from topobelief.experiments.trajectory_uncertainty import best_and_worst
 from topobelief.report.reproduction.entropy_figures import draw_bounds, draw_signatures
 from topobelief.report.reproduction.length_figure import draw_lengths
 from topobelief.report.reproduction.quality_figures import draw_anytime, draw_bounds_quality, draw_real_graphs
 from topobelief.report.reproduction.random_graph_figures import draw_random_graphs
 from topobelief.report.reproduction.session_figures import draw_candidates, draw_uncertainty
 from topobelief.report.reproduction.time_figures import draw_speed_ratios, draw_times
+from topobelief.reproduction.planning_sessions import NOISES, SESSIONS, cases, office_session
+from topobelief.reproduction.run import Reproduction
+from topobelief.reproduction.trajectory_uncertainty import best_and_worst
 
 
 @dataclass(frozen=True, slots=True)

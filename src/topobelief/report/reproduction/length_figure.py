@@ -10,11 +10,11 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from topobelief.experiments.path_length import UNITS, LengthRow, length_correlation
-from topobelief.experiments.planning_sessions import OBJECTIVES
 from topobelief.report import style
 from topobelief.report.canvas import Entry
 from topobelief.report.reproduction.panels import MARGIN, Grid, light_grid, signed
+from topobelief.reproduction.path_length import UNITS, LengthRow, length_correlation
+from topobelief.reproduction.planning_sessions import OBJECTIVES
 
 _NAMES = {"joint": "joint entropy", "map": "map entropy", "per_pose": "joint entropy per pose"}
 

@@ -20,12 +20,12 @@ from shapely import MultiPolygon
 
 from topobelief.arrays import FloatArray
 from topobelief.candidates.polyline import subdivided
-from topobelief.experiments.claims import Claim
-from topobelief.experiments.planning_sessions import NOISES, SESSIONS, PlanningSession, cases, office_session
-from topobelief.experiments.reproduction import Reproduction
 from topobelief.io.json_values import without_nan
 from topobelief.optional import load
 from topobelief.report.reproduction.figures import NamedFigure
+from topobelief.reproduction.claims import Claim
+from topobelief.reproduction.planning_sessions import NOISES, SESSIONS, PlanningSession, cases, office_session
+from topobelief.reproduction.run import Reproduction
 
 TITLE = "Topological belief space planning, reproduced"
 

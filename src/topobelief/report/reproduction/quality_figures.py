@@ -8,12 +8,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from topobelief.experiments.anytime import AnytimeRow
-from topobelief.experiments.bounds_quality import FAMILIES, BoundsRow
-from topobelief.experiments.planning_sessions import NOISES, OBJECTIVES, SESSIONS
 from topobelief.report import style
 from topobelief.report.canvas import Entry, Panel
 from topobelief.report.reproduction.panels import MARGIN, NOISE_COLOURS, SIGNATURE_LOOKS, Grid, light_grid
+from topobelief.reproduction.anytime import AnytimeRow
+from topobelief.reproduction.bounds_quality import FAMILIES, BoundsRow
+from topobelief.reproduction.planning_sessions import NOISES, OBJECTIVES, SESSIONS
 
 _OBJECTIVE_NAMES = {"joint": "joint", "map": "map", "per_pose": "per pose"}
 _ORDER_LOOKS = {

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from topobelief.experiments.claims import SIGNATURES, graph_correlation, slope_ratio
-from topobelief.experiments.random_graphs import RandomGraphRow
 from topobelief.report import style
 from topobelief.report.canvas import Entry
 from topobelief.report.reproduction.panels import MARGIN, Grid, light_grid, signed
 from topobelief.report.reproduction.time_figures import shades
+from topobelief.reproduction.claims import SIGNATURES, graph_correlation, slope_ratio
+from topobelief.reproduction.random_graphs import RandomGraphRow
 
 _SHOWN = ("spanning_trees", "von_neumann_approx", "von_neumann_normalized")
 

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from topobelief.experiments.planning_sessions import PlanningSession
-from topobelief.experiments.trajectory_uncertainty import TrajectoryUncertainty
 from topobelief.report import style
 from topobelief.report.canvas import Entry, Panel
 from topobelief.report.reproduction.panels import MARGIN, Grid
+from topobelief.reproduction.planning_sessions import PlanningSession
+from topobelief.reproduction.trajectory_uncertainty import TrajectoryUncertainty
 
 _WIDTH, _ELLIPSE_POINTS = 3.9, 37
 _CONFIDENCE = math.sqrt(-2 * math.log(0.05))  # standard deviations of a plane's 95 % ellipse

@@ -8,12 +8,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from topobelief.experiments.planning_sessions import SESSIONS
-from topobelief.experiments.random_graphs import RandomGraphRow
-from topobelief.experiments.time_per_action import METHODS, TimeRow
 from topobelief.report import style
 from topobelief.report.canvas import Entry
 from topobelief.report.reproduction.panels import MARGIN, Grid, light_grid, plain_log_ticks
+from topobelief.reproduction.planning_sessions import SESSIONS
+from topobelief.reproduction.random_graphs import RandomGraphRow
+from topobelief.reproduction.time_per_action import METHODS, TimeRow
 
 _KINDS = {"standard": "#7A7A7A", "paper": style.BEST, "engine": style.SURVIVOR}
 _KIND_LABELS = {"standard": "standard planning, GTSAM", "paper": "topological, from scratch", "engine": "this engine"}

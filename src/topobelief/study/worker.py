@@ -1,0 +1,40 @@
+"""A process that plays tasks: they come pickled on standard input, outcomes go back on standard output.
+
+Run as `python -m topobelief.study.worker`; it ends when its input does, so it does not outlive the study.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import os
+import pickle
+import sys
+from typing import IO
+
+from topobelief.study.attempt import attempt
+
+READY = "ready"
+"""What a worker says first."""
+
+
+def serve() -> None:
+    """Answer until the input ends."""
+    faulthandler.enable()  # a crash leaves its name on stderr
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what a library prints is no answer
+    try:
+        _send(answers, READY)
+        while True:
+            play, task = pickle.load(sys.stdin.buffer)
+            _send(answers, attempt(play, task))
+    except (EOFError, BrokenPipeError):  # the study is over, or gone
+        pass
+
+
+def _send(answers: IO[bytes], message: object) -> None:
+    pickle.dump(message, answers, protocol=pickle.HIGHEST_PROTOCOL)
+    answers.flush()
+
+
+if __name__ == "__main__":
+    serve()
