@@ -7,7 +7,9 @@ import tempfile
 from functools import lru_cache
 from pathlib import Path
 
-from topobelief.reproduction.run import Reproduction, ReproductionPlan, reproduce
+from topobelief.reproduction.plan import ReproductionPlan
+from topobelief.reproduction.run import Reproduction, reproduce
+from topobelief.runs.in_process import InProcess
 
 SMALLEST = ReproductionPlan(
     num_seeds=1,
@@ -26,7 +28,7 @@ _FOLDER = tempfile.TemporaryDirectory()
 
 @lru_cache(maxsize=1)
 def smallest_reproduction() -> Reproduction:
-    return reproduce(SMALLEST, Path(_FOLDER.name))
+    return reproduce(SMALLEST, Path(_FOLDER.name), InProcess())
 
 
 def copy_of_smallest_reproduction(folder: Path) -> Reproduction:

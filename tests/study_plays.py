@@ -45,3 +45,10 @@ def mute(task: Task) -> Row:
     """Ends the process without a signal, with words on stderr."""
     os.write(2, b"out of luck\n")
     os._exit(3)
+
+
+def hanging(task: Task) -> Row:
+    """Seed 1 takes for ever."""
+    if task.seed == 1:
+        time.sleep(1000)
+    return quick(task)

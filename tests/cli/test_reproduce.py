@@ -9,8 +9,8 @@ import pytest
 
 from reproductions import SMALLEST, copy_of_smallest_reproduction
 from topobelief.cli.app import run
-from topobelief.reproduction import run as reproduction
-from topobelief.reproduction.run import ReproductionPlan
+from topobelief.reproduction.plan import ReproductionPlan
+from topobelief.runs.local_workers import LocalWorkers
 
 
 @pytest.fixture
@@ -55,25 +55,28 @@ def test_bad_input_is_one_line_and_leaves_nothing(tmp_path: Path, capsys: pytest
 
 
 def test_another_runs_folder_is_refused(small: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    before = (small / "run.json").read_bytes()
+    before = (small / "journal.jsonl").read_bytes()
     assert run(["reproduce", "--seed", "7", "--out", str(small)]) == 2
-    assert "the same settings, got others; choose another --out" in capsys.readouterr().err
-    assert (small / "run.json").read_bytes() == before
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "expected a run with the same settings, seed 7, got seed 0; choose another --out" in said
+    assert (small / "journal.jsonl").read_bytes() == before
 
 
 def test_an_interrupted_run_keeps_its_parts_and_says_so(
     small: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    part = min((small / "parts" / "random_graphs").glob("*.csv"))
-    part.unlink()
+    journal = small / "journal.jsonl"
+    before = journal.read_text(encoding="utf-8")
+    kept = before.splitlines(keepends=True)[:-3]
+    journal.write_text("".join(kept), encoding="utf-8")
 
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(reproduction, "random_graph_row", interrupt)
+    monkeypatch.setattr(LocalWorkers, "run", interrupt)
     assert run(["reproduce", "--quick", "--out", str(small)]) == 130
     said = capsys.readouterr()
     assert "the same command continues" in said.out
     assert "interrupted" in said.err
-    assert not part.exists()
-    assert len(list((small / "parts" / "random_graphs").glob("*"))) == 2 * 5 * 2 - 1
+    assert journal.read_text(encoding="utf-8") == "".join(kept)

@@ -146,7 +146,7 @@ def test_another_run_is_not_continued(topobelief, room):
 
 def test_a_comparison_is_continued(topobelief, room, tmp_path):
     arguments = ["simulate-compare", str(room), "--seeds", "1", "--redraws", "3", "--out", "compared"]
-    arguments += ["--strategies", "shortest,path-3"]
+    arguments += ["--strategies", "shortest,path-2"]
     outcome = topobelief(arguments)
     assert outcome.code == 0, outcome.err
     first = (tmp_path / "compared" / "comparison.csv").read_text()
@@ -154,7 +154,7 @@ def test_a_comparison_is_continued(topobelief, room, tmp_path):
     assert (tmp_path / "compared" / "comparison.png").exists()
     again = topobelief([*arguments, "--json"])
     found = json.loads(again.out)
-    assert [each["strategy"] for each in found["strategies"]] == ["shortest", "path-3"]
+    assert [each["strategy"] for each in found["strategies"]] == ["shortest", "path-2"]
     assert found["runs"][0]["num_shared"] == found["runs"][1]["num_shared"]
     assert (tmp_path / "compared" / "comparison.csv").read_text() == first
     other = topobelief([*arguments[:-1], "shortest,random"])

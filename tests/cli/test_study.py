@@ -18,10 +18,10 @@ import pyarrow.dataset
 import pytest
 from PIL import Image
 
-from topobelief.cli import app, study_progress
+from topobelief.cli import app, run_progress
 from topobelief.cli.app import BAD_INPUT
-from topobelief.cli.study_progress import StudyProgress, description
-from topobelief.study import runner
+from topobelief.cli.run_progress import RunProgress, description
+from topobelief.runs.run import Progress
 from topobelief.study.dataset import read_table, repeatable
 
 KILLS = int(os.environ.get("TOPOBELIEF_KILLS", "2"))
@@ -179,17 +179,17 @@ def test_ctrl_c_leaves_whole_rows(specification, tmp_path):
 
 
 def test_progress_is_a_sentence():
-    assert description(runner.Progress(0, 0, 120, None)) == "tasks 0/120"
-    assert description(runner.Progress(40, 2, 120, 61.2)) == "tasks 40/120, 2 failed, some 61 s left"
-    assert description(runner.Progress(40, 0, 120, 250.0)) == "tasks 40/120, some 4 min left"
-    assert description(runner.Progress(40, 0, 120, 9000.0)) == "tasks 40/120, some 2.5 h left"
-    assert description(runner.Progress(120, 0, 120, 0.0)) == "tasks 120/120"
+    assert description(Progress(0, 0, 120, None), "tasks") == "tasks 0/120"
+    assert description(Progress(40, 2, 120, 61.2), "tasks") == "tasks 40/120, 2 failed, some 61 s left"
+    assert description(Progress(40, 0, 120, 250.0), "tasks") == "tasks 40/120, some 4 min left"
+    assert description(Progress(40, 0, 120, 9000.0), "tasks") == "tasks 40/120, some 2.5 h left"
+    assert description(Progress(120, 0, 120, 0.0), "tasks") == "tasks 120/120"
 
 
 def test_a_log_gets_a_line_now_and_then(capsys, monkeypatch):
     clock = iter([0.0, 10.0, 31.0, 31.0, 40.0])
-    monkeypatch.setattr(study_progress.time, "monotonic", lambda: next(clock))
-    with StudyProgress() as progress:
+    monkeypatch.setattr(run_progress.time, "monotonic", lambda: next(clock))
+    with RunProgress("tasks") as progress:
         for done in range(3):
-            progress.update(runner.Progress(done, 0, 9, None))
+            progress.update(Progress(done, 0, 9, None))
     assert capsys.readouterr().err == "topobelief: tasks 1/9\n"

@@ -10,116 +10,95 @@ import pytest
 
 from reproductions import SMALLEST, copy_of_smallest_reproduction
 from topobelief.errors import FileError, InvalidInputError
-from topobelief.io.row_files import csv_text, read_rows, write_rows
+from topobelief.io.row_files import csv_text
 from topobelief.reproduction import run as reproduction
+from topobelief.reproduction.path_length import LengthRow
+from topobelief.reproduction.plan import ReproductionPlan
 from topobelief.reproduction.planning_sessions import ActionRow
-from topobelief.reproduction.run import Experiment, ReproductionPlan, reproduce
+from topobelief.reproduction.run import Part, experiments, measure, reproduce
+from topobelief.runs.in_process import InProcess
+from topobelief.runs.local_workers import LocalWorkers
+from topobelief.runs.run import UnfinishedRunError
 
 
-@dataclasses.dataclass(frozen=True)
-class Row:
-    name: str
-    count: int
-    value: float
-    fine: bool
+def without(folder: Path, *parts: str) -> None:
+    """Take parts out of the journal, as if the run had been stopped before them."""
+    path = folder / "journal.jsonl"
+    header, *lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    path.write_text(header + "".join(line for line in lines if json.loads(line)["task"] not in parts), encoding="utf-8")
 
 
-ROWS = [Row('a, "b"\nc', 3, 0.1 + 0.2, True), Row("", -1, float("nan"), False), Row("x", 0, float("-inf"), True)]
-
-
-def test_rows_read_back_to_the_last_bit(tmp_path: Path) -> None:
-    write_rows(tmp_path / "new" / "rows.csv", Row, ROWS)
-    read = read_rows(tmp_path / "new" / "rows.csv", Row)
-    assert csv_text(Row, read) == csv_text(Row, ROWS)
-    assert read[0] == ROWS[0]
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("name,count\n", "rows.csv:1: expected the columns name,count,value,fine"),
-        ("name,count,value,fine\na,1,2.0,True\nb,one,2.0,True\n", "rows.csv:3: expected a row of Row"),
-        ("name,count,value,fine\na,1,2.0\n", "rows.csv:2: expected a row of Row"),
-        ("", "rows.csv: expected a text file, got an empty one"),
-    ],
-)
-def test_a_file_that_holds_other_rows_is_refused(tmp_path: Path, text: str, message: str) -> None:
-    (tmp_path / "rows.csv").write_text(text, encoding="utf-8")
-    with pytest.raises(FileError, match=message):
-        read_rows(tmp_path / "rows.csv", Row)
-
-
-class Interrupted(Exception):
-    pass
-
-
-def fake_experiments(measured: list[str], *, fail_at: str = "") -> tuple[Experiment[Row], ...]:
-    """Two tables of two parts that note when they are measured."""
-
-    def part(name: str) -> list[Row]:
-        if name == fail_at:
-            raise Interrupted
-        measured.append(name)
-        return [Row(name, len(measured), 0.5, True)]
-
-    return tuple(
-        Experiment(table, table, Row, {name: lambda name=f"{table}-{name}": part(name) for name in ("one", "two")})
-        for table in ("first", "second")
-    )
-
-
-def run_parts(folder: Path, experiments: tuple[Experiment[Row], ...]) -> list[Row]:
-    rows: list[Row] = []
-    for experiment in experiments:
-        for part, _ in reproduction._parts(experiment, folder / experiment.name, lambda *_: None):
-            rows += part
-    return rows
-
-
-def test_a_run_that_was_stopped_continues_and_repeats_nothing(tmp_path: Path) -> None:
-    measured: list[str] = []
-    with pytest.raises(Interrupted):
-        run_parts(tmp_path, fake_experiments(measured, fail_at="second-one"))
-    assert measured == ["first-one", "first-two"]
-    rows = run_parts(tmp_path, fake_experiments(measured))
-    assert measured == ["first-one", "first-two", "second-one", "second-two"]
-    assert [row.name for row in rows] == measured
-    assert not list(tmp_path.glob("**/.*"))  # nothing half-written
-
-
-def test_tables_are_the_same_whether_or_not_the_run_was_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_reproduction_that_was_stopped_continues_with_the_same_numbers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     found = copy_of_smallest_reproduction(tmp_path)
     table = (tmp_path / "tables" / "planning_sessions.csv").read_bytes()
-    kept = sorted((tmp_path / "parts" / "planning_sessions").glob("*.csv"))
-    kept[0].unlink()
-    again = reproduce(SMALLEST, tmp_path)
+    without(tmp_path, "planning_sessions/seed0-S1-xi0.1", "path_length/seed0")
+    measured: list[str] = []
+    monkeypatch.setattr(reproduction, "measure", lambda part: measured.append(part.id) or measure(part))
+    again = reproduce(SMALLEST, tmp_path, InProcess())
+    assert measured == ["planning_sessions/seed0-S1-xi0.1", "path_length/seed0"]
     assert (tmp_path / "tables" / "planning_sessions.csv").read_bytes() == table
     assert again.actions == found.actions
     assert again.times == found.times  # not timed again
-    assert again.seconds >= found.seconds
+    assert again.seconds > 0
     assert len(found.actions) == 3 * (9 + 20)
     assert {row.session for row in found.actions} == {"S1", "S2"}
-    assert read_rows(tmp_path / "tables" / "planning_sessions.csv", ActionRow) == found.actions
-    noted = json.loads((tmp_path / "run.json").read_text(encoding="utf-8"))
-    assert noted["plan"]["num_seeds"] == 1
-    assert noted["machine"]["topobelief"]
-    with pytest.raises(InvalidInputError, match="the same settings, got others; choose another --out"):
-        reproduce(dataclasses.replace(SMALLEST, seed=1), tmp_path)
+    assert table.decode() == csv_text(ActionRow, found.actions)
+
+
+def test_worker_processes_measure_the_same(tmp_path: Path) -> None:
+    found = copy_of_smallest_reproduction(tmp_path)
+    without(tmp_path, "path_length/seed0")
+    again = reproduce(SMALLEST, tmp_path, LocalWorkers(1, one_thread=False))
+    assert csv_text(LengthRow, again.lengths) == csv_text(LengthRow, found.lengths)
+
+
+def test_another_plan_or_version_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    copy_of_smallest_reproduction(tmp_path)
+    with pytest.raises(FileError, match="the same settings, seed 1, got seed 0; choose another --out"):
+        reproduce(dataclasses.replace(SMALLEST, seed=1), tmp_path, InProcess())
     monkeypatch.setattr(reproduction, "describe_machine", lambda: {"topobelief": "another"})
-    with pytest.raises(InvalidInputError, match="the same settings, got others"):
-        reproduce(SMALLEST, tmp_path)
+    with pytest.raises(FileError, match='topobelief "another", got topobelief'):
+        reproduce(SMALLEST, tmp_path, InProcess())
 
 
-def test_a_folder_with_another_run_json_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "run.json").write_text("[]", encoding="utf-8")
-    with pytest.raises(FileError, match="expected the settings of a run"):
-        reproduce(SMALLEST, tmp_path)
+def test_a_file_that_changed_is_another_run(tmp_path: Path) -> None:
+    plan = dataclasses.replace(SMALLEST, files=(tmp_path / "x.g2o",))
+    digests = []
+    for text in ("one", "another"):
+        (tmp_path / "x.g2o").write_text(text)
+        digests.append(reproduction._settings(plan, "1")["files"])
+    assert digests[0] != digests[1]
+
+
+def test_a_part_that_fails_is_named_and_tried_again(tmp_path: Path) -> None:
+    """The others are measured all the same."""
+    copy_of_smallest_reproduction(tmp_path / "out")
+    (tmp_path / "x.g2o").write_text("no graph")
+    plan = dataclasses.replace(SMALLEST, files=(tmp_path / "x.g2o",))
+    (tmp_path / "out" / "journal.jsonl").write_text(
+        (tmp_path / "out" / "journal.jsonl").read_text().replace('"files": {}', f'"files": {files_of(plan)}')
+    )
+    for _ in range(2):
+        with pytest.raises(UnfinishedRunError, match=r"got 2 that failed, the first with FileError: .*x\.g2o"):
+            reproduce(plan, tmp_path / "out", InProcess())
+
+
+def files_of(plan: ReproductionPlan) -> str:
+    return json.dumps(reproduction._settings(plan, "1")["files"])
+
+
+def test_every_part_has_an_id_of_its_own() -> None:
+    plan = ReproductionPlan.for_a_first_look()
+    ids = [Part(plan, experiment.name, name).id for experiment in experiments(plan) for name in experiment.parts]
+    assert len(set(ids)) == len(ids) > 100
 
 
 def test_a_missing_pose_graph_is_named_before_any_work(tmp_path: Path) -> None:
     plan = dataclasses.replace(SMALLEST, files=(tmp_path / "none.g2o",))
     with pytest.raises(FileError, match=r"none\.g2o: expected a pose graph to read, got no such file"):
-        reproduce(plan, tmp_path / "out")
+        reproduce(plan, tmp_path / "out", InProcess())
     assert not (tmp_path / "out").exists()
 
 

@@ -1,34 +1,27 @@
-"""Compared runs in files, seeds in processes, and seeds that fail."""
+"""A comparison as a run: seeds in processes that die, hang and are interrupted, and a folder that continues."""
 
 from __future__ import annotations
 
-import math
+import os
+import signal
 from dataclasses import replace
 from pathlib import Path
 
+import psutil
 import pytest
 
+from compared_plays import deadly, quick, slow
 from topobelief.errors import FileError, InvalidInputError
+from topobelief.io.row_files import csv_text
+from topobelief.runs import local_workers
+from topobelief.runs.in_process import InProcess
+from topobelief.runs.local_workers import LocalWorkers
+from topobelief.runs.run import UnfinishedRunError
+from topobelief.simulation import strategy_comparison
 from topobelief.simulation.comparison import ComparedRun
 from topobelief.simulation.noise import InjectedNoise
 from topobelief.simulation.record import RunOptions
-from topobelief.simulation.strategy_comparison import ComparisonTask, play, played, read_runs, write_runs
-
-RUN = ComparedRun(
-    seed=3,
-    strategy="spanning_trees",
-    outcome="arrived",
-    planned=10.0,
-    shortest=9.0,
-    num_poses=30,
-    num_shared=20,
-    num_closures=4,
-    entropy=float("nan"),
-    error_shared=0.1234567890123456,
-    error_all=0.2,
-    spread_shared=0.1,
-    error_before=0.5,
-)
+from topobelief.simulation.strategy_comparison import ComparisonTask, SeedTask, compare, play
 
 
 @pytest.fixture
@@ -39,34 +32,20 @@ def task(tmp_path: Path) -> ComparisonTask:
     return ComparisonTask(
         scenario=str(tmp_path / "room.yaml"),
         max_detour=0,
-        strategies=("shortest", "path-2"),
+        strategies=("shortest", "path-1"),
         options=RunOptions(noise=InjectedNoise.of_ratio(0.35)),
         num_redraws=2,
     )
 
 
-def test_runs_return_bit_for_bit(tmp_path):
-    runs = [RUN, replace(RUN, seed=0, strategy="random", outcome="stuck: at (1, 2), really", entropy=-4.5)]
-    write_runs(tmp_path / "runs.csv", runs)
-    first, second = read_runs(tmp_path / "runs.csv")
-    assert first == runs[1]
-    assert math.isnan(second.entropy)
-    assert replace(second, entropy=0.0) == replace(RUN, entropy=0.0)
-
-
-@pytest.mark.parametrize(("old", "new"), [("0.2,", "much,"), ("planned", "length")])
-def test_damaged_files_are_named_with_the_line(tmp_path, old, new):
-    path = tmp_path / "runs.csv"
-    write_runs(path, [RUN])
-    path.write_text(path.read_text().replace(old, new))
-    with pytest.raises(FileError, match=r"runs\.csv:2: expected a compared run"):
-        read_runs(path)
+def workers() -> list[psutil.Process]:
+    return [child for child in psutil.Process().children() if "topobelief.runs.worker" in child.cmdline()]
 
 
 def test_strategies_of_a_seed_share_the_start(task):
     """With one goal they share the first pose alone, on which no error is left."""
-    shortest, second = play(task, 0)
-    assert (shortest.seed, shortest.strategy, second.strategy) == (0, "shortest", "path-2")
+    shortest, second = play(SeedTask(task, 0))
+    assert (shortest.seed, shortest.strategy, second.strategy) == (0, "shortest", "path-1")
     assert shortest.outcome == second.outcome == "arrived"
     assert shortest.planned == shortest.shortest < second.planned
     assert shortest.num_shared == 1
@@ -75,10 +54,95 @@ def test_strategies_of_a_seed_share_the_start(task):
 
 def test_physical_noise_is_refused(task):
     with pytest.raises(InvalidInputError, match="expected injected noise"):
-        play(replace(task, options=RunOptions()), 0)
+        replace(task, options=RunOptions())
 
 
-def test_processes_give_what_one_gives(task):
-    (alone,) = played(task, [0], num_workers=1)
-    (apart,) = played(task, [0], num_workers=2)
-    assert alone == apart
+def test_processes_give_what_this_one_gives(task, tmp_path):
+    here, there = (compare(task, 1, tmp_path / str(n), executor) for n, executor in enumerate((InProcess(), LocalWorkers(2))))
+    assert here.runs == there.runs
+    assert [run.outcome for run in here.runs] == ["arrived", "arrived"]
+
+
+def test_a_comparison_continues_and_grows(task, tmp_path, monkeypatch):
+    played = []
+    monkeypatch.setattr(strategy_comparison, "play", lambda seed: played.append(seed.seed) or quick(seed))
+    alone = compare(task, 1, tmp_path, InProcess())
+    again = compare(task, 2, tmp_path, InProcess())
+    assert played == [0, 1]
+    assert (alone.num_seeds_now, again.num_seeds_now) == (1, 1)
+    assert csv_text(ComparedRun, again.runs[:2]) == csv_text(ComparedRun, alone.runs)
+    assert [(run.seed, run.strategy) for run in again.runs] == [(s, name) for s in (0, 1) for name in task.strategies]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"num_redraws": 3}, "num_redraws 3, got num_redraws 2; choose another --out"),
+        ({"strategies": ("shortest",)}, "strategies"),
+    ],
+)
+def test_another_comparison_is_refused(task, tmp_path, monkeypatch, change, message):
+    monkeypatch.setattr(strategy_comparison, "play", quick)
+    compare(task, 1, tmp_path, InProcess())
+    with pytest.raises(FileError, match=message):
+        compare(replace(task, **change), 1, tmp_path, InProcess())
+
+
+def test_another_map_under_the_same_name_is_refused(task, tmp_path, monkeypatch):
+    monkeypatch.setattr(strategy_comparison, "play", quick)
+    compare(task, 1, tmp_path, InProcess())
+    walls = tmp_path / "walls.csv"
+    walls.write_text(walls.read_text().replace("2.5,2.5", "2.4,2.5"))
+    with pytest.raises(FileError, match=r"content .*, got content"):
+        compare(task, 1, tmp_path, InProcess())
+
+
+def test_a_worker_killed_in_the_middle_costs_nothing(task, tmp_path, monkeypatch, importing_workers):
+    """Its seed is begun again, and the seeds after it are driven too."""
+    monkeypatch.setattr(strategy_comparison, "play", slow)
+    killed: list[int] = []
+
+    def kill_the_worker(progress) -> None:
+        if progress.done == 1:
+            (worker,) = workers()
+            worker.kill()
+            killed.append(worker.pid)
+
+    found = compare(task, 3, tmp_path, LocalWorkers(1), on_progress=kill_the_worker)
+    assert found.failed == {}
+    drove = [run.num_closures for run in found.runs[::2]]  # see compared_plays
+    assert drove[0] == killed[0] != drove[1] == drove[2]
+
+
+def test_seeds_that_always_kill_or_hang_fail_and_are_named(task, tmp_path, monkeypatch, importing_workers):
+    monkeypatch.setattr(strategy_comparison, "play", deadly)
+    monkeypatch.setattr(local_workers, "MAX_ATTEMPTS", 1)  # each of the more is a process to start
+    found = compare(task, 4, tmp_path, LocalWorkers(2, max_seconds=5))
+    assert {run.seed for run in found.runs} == {0, 3}
+    assert found.failed == {
+        1: "WorkerDiedError: a worker died (SIGKILL)",
+        2: "WorkerTooSlowError: a worker took more than 5 s over one task",
+    }
+    assert compare(task, 4, tmp_path, InProcess()).num_seeds_now == 0
+    monkeypatch.setattr(strategy_comparison, "play", quick)
+    again = compare(task, 4, tmp_path, InProcess(), retry_failed=True)
+    assert (again.num_seeds_now, again.failed) == (2, {})
+
+
+def test_an_interruption_keeps_the_seeds_that_are_done_and_no_worker(task, tmp_path, monkeypatch, importing_workers):
+    monkeypatch.setattr(strategy_comparison, "play", slow)
+
+    def interrupt(progress) -> None:
+        if progress.done == 2:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        compare(task, 5, tmp_path, LocalWorkers(2), on_progress=interrupt)
+    assert workers() == []
+    assert compare(task, 5, tmp_path, InProcess()).num_seeds_now == 3
+
+
+def test_a_comparison_without_a_seed_that_works_is_an_error(task, tmp_path, monkeypatch):
+    monkeypatch.setattr(strategy_comparison, "play", lambda seed: 1 / 0)
+    with pytest.raises(UnfinishedRunError, match="got 2 that failed, the first with ZeroDivisionError"):
+        compare(task, 2, tmp_path, InProcess())

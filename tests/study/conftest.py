@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -65,11 +64,9 @@ def specification_file(make_tasks: TaskMaker, tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def plays_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def plays_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, importing_workers: None) -> Path:
     """Where the stand-ins leave marks; workers started within the test find their module."""
     folder = tmp_path / "marks"
     folder.mkdir()
-    paths = [str(Path(__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, paths)))
     monkeypatch.setenv("STUDY_PLAYS_FOLDER", str(folder))
     return folder

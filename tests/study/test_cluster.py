@@ -15,12 +15,12 @@ from pathlib import Path
 
 import pytest
 
-from study_plays import deadly, failing, quick, slow
+from study_plays import deadly, failing, hanging, quick, slow
 from topobelief.errors import InvalidInputError
-from topobelief.study import cluster
-from topobelief.study.cluster import Cluster, ClusterLostError
+from topobelief.runs import cluster
+from topobelief.runs.cluster import Cluster, ClusterLostError
+from topobelief.runs.local_workers import LocalWorkers
 from topobelief.study.dataset import Dataset, read_table, repeatable
-from topobelief.study.local_workers import LocalWorkers
 from topobelief.study.runner import run_study
 
 pytest.importorskip("distributed")
@@ -98,11 +98,11 @@ def test_a_cluster_gives_the_rows_of_this_machine(make_tasks, tmp_path, processe
     address, tasks = processes.address, make_tasks(seeds="[5]")
     outcome = run_study(tasks, tmp_path / "far", Cluster(address))
     run_study(tasks, tmp_path / "near", LocalWorkers(1))
-    assert (outcome.num_played, outcome.num_failed) == (len(tasks), 0)
+    assert (outcome.num_done_now, outcome.num_failed) == (len(tasks), 0)
     assert rows(tmp_path / "far") == rows(tmp_path / "near")
 
     failed = run_study(make_tasks(), tmp_path / "failing", Cluster(address), play=failing)  # the cluster serves the next study
-    assert (failed.num_played, failed.num_failed) == (24, 16)
+    assert (failed.num_done_now, failed.num_failed) == (24, 16)
 
 
 def test_workers_killed_at_random_lose_and_repeat_no_row(make_tasks, tmp_path, processes):
@@ -125,7 +125,7 @@ def test_workers_killed_at_random_lose_and_repeat_no_row(make_tasks, tmp_path, p
         over.set()
         killer.join()
     assert kills >= 1
-    assert (outcome.num_played, outcome.num_failed) == (len(tasks), 0)
+    assert (outcome.num_done_now, outcome.num_failed) == (len(tasks), 0)
     assert sorted(read_table(tmp_path / "out")["task"].to_pylist()) == sorted(task.id for task in tasks)
 
 
@@ -137,6 +137,14 @@ def test_a_task_that_kills_its_workers_is_blamed_alone(make_tasks, tmp_path, pro
     assert status == {0: "ok", 1: "failed", 2: "ok"}
     assert outcome.first_error is not None
     assert outcome.first_error.startswith("WorkerDiedError: several workers of the cluster died over it")
+
+
+def test_a_task_that_hangs_is_ended(make_tasks, tmp_path, processes):
+    tasks = make_tasks(strategies="[random]")[:12:4]
+    outcome = run_study(tasks, tmp_path / "out", Cluster(processes.address, max_seconds=0.5), play=hanging)
+    table = read_table(tmp_path / "out")
+    assert dict(zip(table["seed"].to_pylist(), table["status"].to_pylist(), strict=True)) == {0: "ok", 1: "failed", 2: "ok"}
+    assert "took too long" in str(outcome.first_error)
 
 
 def test_a_scheduler_that_goes_away_ends_the_run_and_the_next_continues(make_tasks, tmp_path, start, plays_folder):
@@ -151,7 +159,7 @@ def test_a_scheduler_that_goes_away_ends_the_run_and_the_next_continues(make_tas
     kept = len(Dataset(tmp_path / "out"))
     assert 3 <= kept < len(tasks)
     outcome = run_study(tasks, tmp_path / "out", LocalWorkers(2), play=quick)
-    assert (outcome.num_played, outcome.num_failed) == (len(tasks) - kept, 0)
+    assert (outcome.num_done_now, outcome.num_failed) == (len(tasks) - kept, 0)
 
 
 def test_no_scheduler_and_no_worker(make_tasks, tmp_path, start, monkeypatch):

@@ -11,10 +11,11 @@ import pytest
 
 from study_plays import deadly, failing, mute, quick, slow
 from topobelief.errors import InvalidInputError
-from topobelief.study import local_workers
-from topobelief.study.attempt import MAX_ATTEMPTS, Finished, Outcome, attempt, with_second_chance
+from topobelief.runs import worker_process
+from topobelief.runs.attempt import MAX_ATTEMPTS, Finished, Outcome, attempt, with_second_chance
+from topobelief.runs.local_workers import LocalWorkers
+from topobelief.runs.worker_process import WorkerDiedError
 from topobelief.study.dataset import Dataset, read_table, repeatable
-from topobelief.study.local_workers import LocalWorkers, WorkerDiedError
 from topobelief.study.runner import run_study
 
 
@@ -56,7 +57,7 @@ def test_the_order_does_not_show(make_tasks, tmp_path, reference, seed):
 @pytest.mark.parametrize("num_workers", [1, 3])
 def test_the_number_of_workers_does_not_show(make_tasks, tmp_path, plays_folder, reference, num_workers):
     outcome = run_study(make_tasks(), tmp_path / "out", LocalWorkers(num_workers), play=quick)
-    assert (outcome.num_tasks, outcome.num_played, outcome.num_failed) == (24, 24, 0)
+    assert (outcome.num_tasks, outcome.num_done_now, outcome.num_failed) == (24, 24, 0)
     assert rows(tmp_path / "out") == reference
 
 
@@ -80,10 +81,10 @@ def test_an_interrupted_study_continues_and_repeats_nothing(make_tasks, tmp_path
             run_study(tasks, tmp_path / "out", InPlace(stop_after=stop_after), play=counted)
         assert len(Dataset(tmp_path / "out")) == len(played)
     outcome = run_study(tasks, tmp_path / "out", InPlace(), play=counted)
-    assert outcome.num_played == len(tasks) - 16
+    assert outcome.num_done_now == len(tasks) - 16
     assert sorted(played) == sorted(task.id for task in tasks)
     assert rows(tmp_path / "out") == reference
-    assert run_study(tasks, tmp_path / "out", InPlace(), play=counted).num_played == 0
+    assert run_study(tasks, tmp_path / "out", InPlace(), play=counted).num_done_now == 0
 
 
 def test_what_fails_is_recorded_and_the_rest_goes_on(make_tasks, tmp_path):
@@ -102,9 +103,9 @@ def test_failed_tasks_are_played_again_only_where_asked(make_tasks, tmp_path):
     tasks = make_tasks()
     run_study(tasks, tmp_path / "out", InPlace(), play=failing)
     again = run_study(tasks, tmp_path / "out", InPlace(), play=quick)
-    assert (again.num_played, again.num_failed) == (0, 16)
+    assert (again.num_done_now, again.num_failed) == (0, 16)
     again = run_study(tasks, tmp_path / "out", InPlace(), play=quick, retry_failed=True)
-    assert (again.num_played, again.num_failed) == (16, 0)
+    assert (again.num_done_now, again.num_failed) == (16, 0)
 
 
 def test_a_worker_that_dies_costs_only_its_task(make_tasks, tmp_path, plays_folder):
@@ -138,7 +139,7 @@ def test_bad_luck_is_not_blamed(make_tasks, tmp_path):
             calls.append([task.id for task in tasks])
             for finished in super().run(play, tasks):
                 lucky = len(tasks) == 1 or finished.task is not tasks[1]
-                yield finished if lucky else Finished(finished.task, Outcome(None, "dead", worker_died=True), 3)
+                yield finished if lucky else Finished(finished.task, Outcome(None, "dead", worker_lost=True), 3)
 
     outcome = run_study(tasks, tmp_path / "out", Unlucky(), play=quick)
     assert outcome.num_failed == 0
@@ -174,7 +175,7 @@ def test_workers_killed_at_random_lose_and_repeat_no_row(make_tasks, tmp_path, p
 
 
 def test_workers_that_cannot_start_end_the_study(make_tasks, tmp_path, monkeypatch):
-    monkeypatch.setattr(local_workers.sys, "executable", "/bin/false")
+    monkeypatch.setattr(worker_process.sys, "executable", "/bin/false")
     with pytest.raises(WorkerDiedError, match=r"expected worker processes that start, got: a worker died \(exit code 1\)"):
         run_study(make_tasks(), tmp_path / "out", LocalWorkers(2))
 

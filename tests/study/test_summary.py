@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
 from study_plays import failing
-from topobelief.study.attempt import Finished, attempt
+from topobelief.runs.attempt import Finished, attempt
 from topobelief.study.dataset import Dataset, read_table
-from topobelief.study.runner import _row
 from topobelief.study.summary import flat, summaries
 
 
@@ -18,10 +18,11 @@ def found(make_tasks, tmp_path):
     """Losses 0, 1, … by seed; seeds 1 and 2 fail."""
     dataset = Dataset(tmp_path)
     for task in make_tasks(seeds="7"):
-        row = _row(Finished(task, attempt(failing, task), 1))
-        if row["status"] == "ok":
-            row |= {"loss": float(task.seed), "action_consistent": task.seed == 0, "num_evaluations": 2 * task.seed}
-        dataset.add(row)
+        outcome = attempt(failing, task)
+        if outcome.result is not None:
+            found = {"loss": float(task.seed), "action_consistent": task.seed == 0, "num_evaluations": 2 * task.seed}
+            outcome = replace(outcome, result=outcome.result | found)
+        dataset.add(Finished(task, outcome, 1))
     return summaries(read_table(tmp_path))
 
 

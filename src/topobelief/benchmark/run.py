@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import math
-import os
-import platform
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
-from importlib.metadata import version
 from itertools import product
 from pathlib import Path
 from typing import Any, get_args
@@ -28,11 +25,11 @@ from topobelief.estimation import optimize
 from topobelief.graph.information import block_isotropic
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.formats import read_pose_graph
+from topobelief.runs.machine import describe_machine
 
 SCHEMA = "topobelief.benchmark/1"
 SIGMA_POSITION, SIGMA_ROTATIONS = 0.1, (0.01, 0.035, 0.085)  # the paper's noises, metres and radians
 SMALL = "small"
-_PACKAGES = ("numpy", "scipy", "numba", "qdldl", "gtsam")
 
 Progress = Callable[[str], None]
 """Called with what is measured next."""
@@ -234,25 +231,3 @@ def _session(name: str, graph: PoseGraph, plan: BenchmarkPlan) -> BenchmarkSessi
     else:
         actions = candidate_paths(graph, 2 * plan.num_actions, rng=rng)
     return BenchmarkSession(name, graph, actions)
-
-
-def describe_machine() -> dict[str, str]:
-    """Processor, cores, memory, system, and versions of Python and of the packages that compute."""
-    facts = {
-        "processor": _processor(),
-        "cores": str(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()),
-        "system": f"{platform.system()} {platform.machine()}",
-        "python": platform.python_version(),
-        "topobelief": version("topobelief"),
-    }
-    return {**facts, **{package: version(package) for package in _PACKAGES}}
-
-
-def _processor() -> str:
-    """The model name where Linux tells it."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="ascii", errors="replace").splitlines()
-    except OSError:
-        return platform.processor() or platform.machine()
-    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.processor() or platform.machine()

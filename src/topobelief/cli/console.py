@@ -11,6 +11,8 @@ from contextlib import contextmanager
 from rich.console import Console, RenderableType
 from rich.progress import BarColumn, Progress, ProgressColumn, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
 
+from topobelief.cli.run_progress import RunProgress
+
 Update = Callable[[int, int], None]
 """Called with how much is done, and out of how much."""
 
@@ -64,6 +66,14 @@ class Reporter:
         """As `stage`, for work whose parts have names in place of numbers."""
         with self._timed(name) as (bar, task):
             yield lambda part: bar.update(task, description=f"{name} {part}")
+
+    @contextmanager
+    def run(self, name: str, what: str) -> Generator[RunProgress]:
+        """As `stage`, for a run of many tasks, which are called this."""
+        begin = time.perf_counter()
+        with RunProgress(what) as progress:
+            yield progress
+        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - begin
 
     @contextmanager
     def _timed(self, name: str, *columns: ProgressColumn) -> Generator[tuple[Progress, TaskID]]:

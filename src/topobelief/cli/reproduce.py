@@ -41,18 +41,19 @@ def reproduce(
         from topobelief.cli import reproduction_files
         from topobelief.cli.plan_files import checked_folder
         from topobelief.report.reproduction.claims_table import claims_table
-        from topobelief.reproduction.run import ReproductionPlan
+        from topobelief.reproduction.plan import ReproductionPlan
         from topobelief.reproduction.run import reproduce as run
+        from topobelief.runs.local_workers import LocalWorkers
 
     folder = out or Path("out") / ("reproduction-quick" if quick else "reproduction")
     checked_folder(folder)
     files = tuple(graph_files or ())
     plan = ReproductionPlan.for_a_first_look(seed=seed, files=files) if quick else ReproductionPlan(seed=seed, files=files)
     try:
-        with reporter.activity("measuring") as tell:
-            found = run(plan, folder, progress=lambda name, done, total: tell(f"{name} {done}/{total}"))
+        with reporter.run("measuring", "parts") as progress:  # one part at a time, since most are timed
+            found = run(plan, folder, LocalWorkers(1, one_thread=False), on_progress=progress.update)
     except KeyboardInterrupt:
-        reporter.say(f"What was measured is in {folder}, as CSV; the same command continues.")
+        reporter.say(f"What was measured is in {folder}; the same command continues.")
         raise
     with reporter.activity("drawing") as tell:
         reproduction_files.write(folder, found, tell)

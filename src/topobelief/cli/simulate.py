@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from topobelief.cli.choices import completed, one_of
+from topobelief.cli.run_options import DEFAULT_TIMEOUT, RetryFailed, Timeout
 from topobelief.planning.registry import OBJECTIVES
 
 _SCENARIO_HELP = "office, lab, corridors, or a .yaml of your own."
@@ -20,7 +21,7 @@ def simulate(
         str,
         typer.Option(
             help="spanning_trees, von_neumann_approx, von_neumann, optimum (proven), standard (all exact), shortest, random, "
-            "or path-k, the k-th shortest."
+            "or path-k: path-0 is the shortest, path-1 the next."
         ),
     ] = "spanning_trees",
     objective: Annotated[
@@ -135,15 +136,19 @@ def simulate_compare(
         ),
     ] = None,
     workers: Annotated[int, typer.Option(min=1, help="Number of processes.")] = 1,
+    timeout: Timeout = DEFAULT_TIMEOUT,
+    retry_failed: RetryFailed = False,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FOLDER", help="Folder for runs and table; finished runs are kept."),
+        typer.Option(metavar="FOLDER", help="Folder for runs and table; an earlier comparison continues."),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the table as JSON and nothing else.")] = False,
 ) -> None:
     """Compare the expected map error of strategies on a scenario's last session, over many draws of the noise.
 
     All earlier sessions of a seed are driven once, so that the strategies decide on the same graph.
+
+    Each seed is kept when it is done. Killed at any moment, the same command continues and repeats nothing.
     """
     from topobelief.cli.console import Reporter
     from topobelief.cli.extras import require_extras
@@ -153,36 +158,36 @@ def simulate_compare(
     with reporter.stage("start-up"):
         from topobelief.cli import comparison_files
         from topobelief.cli.plan_files import checked_folder
-        from topobelief.errors import InvalidInputError
         from topobelief.report.simulation_tables import comparison_table
+        from topobelief.runs.local_workers import LocalWorkers
         from topobelief.simulation.comparison import summarised
         from topobelief.simulation.noise import parse_noise
         from topobelief.simulation.record import RunOptions
         from topobelief.simulation.scenario_file import scenario_of
-        from topobelief.simulation.strategy_comparison import ComparisonTask
+        from topobelief.simulation.strategy_comparison import ComparisonTask, compare
         from topobelief.strategies.registry import checked_strategy
 
         names = tuple(dict.fromkeys(checked_strategy(name.strip()) for name in strategies.split(",")))
-        injected = parse_noise(noise)
-        if injected is None:
-            raise InvalidInputError("expected injected noise to redraw, got physical noise, of which there is one draw a run")
+        task = ComparisonTask(
+            scenario=scenario,
+            max_detour=max_detour,
+            strategies=names,
+            options=RunOptions(objective=objective, noise=parse_noise(noise)),
+            num_redraws=redraws,
+        )
         folder = out or Path("out") / f"compare-{Path(scenario).stem}"
         checked_folder(folder)
         caution = scenario_of(scenario).caution
         if caution:
             reporter.warn(caution)
-        task = ComparisonTask(
-            scenario=scenario,
-            max_detour=max_detour,
-            strategies=names,
-            options=RunOptions(objective=objective, noise=injected),
-            num_redraws=redraws,
-        )
-    with reporter.stage("seeds") as update:
-        runs = comparison_files.compared(task, seeds, folder, num_workers=workers, on_progress=update)
-    found = summarised(runs, baseline=names[0])
-    reporter.say(comparison_table(found, baseline=names[0]))
+    executor = LocalWorkers(workers, max_seconds=timeout or None)
+    with reporter.run("driving", "seeds") as progress:
+        found = compare(task, seeds, folder, executor, retry_failed=retry_failed, on_progress=progress.update)
+    reporter.say(comparison_table(summarised(found.runs, baseline=names[0]), baseline=names[0]))
+    if found.failed:
+        seed, error = next(iter(found.failed.items()))
+        reporter.say(f"{len(found.failed)} of {seeds} seeds failed and are left out; seed {seed}: {error}")
     with reporter.stage("pictures"):
-        comparison_files.write(folder, task, runs)
+        comparison_files.write(folder, found)
     reporter.say(f"{folder}: comparison.csv, comparison.json, comparison.png", f"Took {reporter.time_taken()}")
-    reporter.answer(comparison_files.document(task, runs))
+    reporter.answer(comparison_files.document(found))

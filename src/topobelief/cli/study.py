@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from topobelief.cli.run_options import DEFAULT_TIMEOUT, RetryFailed, Timeout
+
 if TYPE_CHECKING:
-    from topobelief.study.attempt import Workers
+    from topobelief.runs.attempt import Executor
 
 
 def study(
@@ -25,9 +27,8 @@ def study(
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="A dask.distributed cluster, such as tcp://10.0.0.1:8786.")
     ] = None,
-    retry_failed: Annotated[
-        bool, typer.Option("--retry-failed", help="Run tasks again that failed in an earlier run.")
-    ] = False,
+    timeout: Timeout = DEFAULT_TIMEOUT,
+    retry_failed: RetryFailed = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the outcome as JSON and nothing else.")] = False,
 ) -> None:
     """Run a grid of worlds, sessions, noises, strategies, objectives and seeds.
@@ -41,7 +42,6 @@ def study(
     reporter = Reporter(as_json=as_json)
     with reporter.stage("start-up"):
         from topobelief.cli.plan_files import checked_folder
-        from topobelief.cli.study_progress import StudyProgress
         from topobelief.study.runner import run_study
         from topobelief.study.specification import read_specification
         from topobelief.study.tasks import tasks_of
@@ -50,11 +50,12 @@ def study(
     checked_folder(folder)
     with reporter.stage("reading"):
         tasks = tasks_of(read_specification(specification_file))
-    with StudyProgress() as progress:
-        outcome = run_study(tasks, folder, _workers(workers, scheduler), retry_failed=retry_failed, on_progress=progress.update)
-    earlier = outcome.num_tasks - outcome.num_played
+    executor = _executor(workers, scheduler, timeout or None)
+    with reporter.run("playing", "tasks") as progress:
+        outcome = run_study(tasks, folder, executor, retry_failed=retry_failed, on_progress=progress.update)
+    earlier = outcome.num_tasks - outcome.num_done_now
     reporter.say(
-        f"{folder}: {outcome.num_tasks} tasks, {outcome.num_played} of them now"
+        f"{folder}: {outcome.num_tasks} tasks, {outcome.num_done_now} of them now"
         + (f", {earlier} in earlier runs" if earlier else "")
     )
     if outcome.num_failed:
@@ -65,21 +66,21 @@ def study(
         {
             "folder": str(folder),
             "num_tasks": outcome.num_tasks,
-            "num_played": outcome.num_played,
+            "num_played": outcome.num_done_now,
             "num_failed": outcome.num_failed,
             "first_error": outcome.first_error,
         }
     )
 
 
-def _workers(num_workers: int | None, scheduler: str | None) -> Workers:
+def _executor(num_workers: int | None, scheduler: str | None, max_seconds: float | None) -> Executor:
     if scheduler is not None:
-        from topobelief.study.cluster import Cluster
+        from topobelief.runs.cluster import Cluster
 
-        return Cluster(scheduler)
-    from topobelief.study.local_workers import LocalWorkers
+        return Cluster(scheduler, max_seconds=max_seconds)
+    from topobelief.runs.local_workers import LocalWorkers
 
-    return LocalWorkers(num_workers)
+    return LocalWorkers(num_workers, max_seconds=max_seconds)
 
 
 def study_report(

@@ -1,20 +1,20 @@
-"""Frozen rows of numbers and names as CSV, and back to the last bit."""
+"""Frozen rows of numbers and names: as CSV, and as values for JSON that come back to the last bit."""
 
 from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, fields
+from functools import lru_cache
 from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
+from typing import Any, TypeVar, cast, get_type_hints
 
 from topobelief.errors import FileError
-from topobelief.io.files import read_text, write_text
+from topobelief.io.files import write_text
 
 R = TypeVar("R")
-
-_PARSERS: dict[type, Any] = {int: int, float: float, str: str, bool: {"True": True, "False": False}.__getitem__}
 
 
 def csv_text(kind: type[R], rows: Sequence[R]) -> str:
@@ -28,8 +28,8 @@ def csv_text(kind: type[R], rows: Sequence[R]) -> str:
     """
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(_names(kind))
-    writer.writerows(asdict(row).values() for row in _as_any(rows))
+    writer.writerow(_types(kind))
+    writer.writerows(asdict(row).values() for row in cast("Sequence[Any]", rows))
     return stream.getvalue()
 
 
@@ -48,30 +48,35 @@ def write_rows(path: Path, kind: type[R], rows: Sequence[R]) -> None:
     write_text(path, csv_text(kind, rows))
 
 
-def read_rows(path: Path, kind: type[R]) -> list[R]:
-    """The rows that `write_rows` wrote.
+def json_rows(rows: Iterable[object]) -> list[dict[str, object]]:
+    """Rows as JSON can hold them: numbers that are not finite become "nan", "inf" and "-inf"."""
+    return [{name: _plain(parse(getattr(row, name))) for name, parse in _types(type(row)).items()} for row in rows]
 
-    Raises
-    ------
-    FileError
-        Names the line that is not such a row.
+
+def rows_of_json(kind: type[R], values: Iterable[dict[str, Any]]) -> list[R]:
+    """The rows of which `json_rows` made these values.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> @dataclass(frozen=True)
+    ... class Distance:
+    ...     name: str
+    ...     metres: float
+    >>> json_rows([Distance("a", float("inf"))])
+    [{'name': 'a', 'metres': 'inf'}]
+    >>> rows_of_json(Distance, [{"name": "a", "metres": "inf"}])
+    [Distance(name='a', metres=inf)]
     """
-    lines = list(csv.reader(io.StringIO(read_text(path))))
-    names, types = _names(kind), get_type_hints(kind)
-    if not lines or lines[0] != names:
-        raise FileError(path, f"expected the columns {','.join(names)[:80]}…, got others; choose another --out", line=1)
-    rows: list[R] = []
-    for number, line in enumerate(lines[1:], start=2):
-        try:
-            rows.append(kind(**{name: _PARSERS[types[name]](text) for name, text in zip(names, line, strict=True)}))
-        except (ValueError, KeyError):
-            raise FileError(path, f"expected a row of {kind.__name__}, got {','.join(line)[:60]!r}", line=number) from None
-    return rows
+    return [kind(**{name: parse(value[name]) for name, parse in _types(kind).items()}) for value in values]
 
 
-def _names(kind: type[Any]) -> list[str]:
-    return [field.name for field in fields(kind)]
+@lru_cache
+def _types(kind: type) -> dict[str, Callable[[Any], Any]]:
+    """The fields and their types, which parse."""
+    hints = get_type_hints(kind)
+    return {field.name: hints[field.name] for field in fields(kind)}
 
 
-def _as_any(rows: Sequence[Any]) -> Sequence[Any]:
-    return rows
+def _plain(value: object) -> object:
+    return str(value) if isinstance(value, float) and not math.isfinite(value) else value

@@ -113,7 +113,7 @@ def draw_topologies(each: Deliberation, world: World, *, name: str) -> Figure:
             canvas.title(
                 left,
                 bottom + height + 0.08,
-                f"Candidate {index + 1} of {len(each.paths)}, {word} entropy{chosen}",
+                f"Path {index} of {len(each.paths)}, {word} entropy{chosen}",
                 f"{each.entropies[index]:.1f} nats, {each.lengths[index]:.1f} m, {action.num_new_poses} poses, "
                 f"{len(action.edges) - action.num_new_poses} closures",
             )

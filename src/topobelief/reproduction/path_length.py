@@ -67,7 +67,7 @@ def length_rows(seed: int, xi: float, num_paths: int) -> list[LengthRow]:
                     xi=xi,
                     unit=unit,
                     objective=objective,
-                    action=index + 1,
+                    action=index,
                     length=path_length(path),
                     num_closures=session.actions[index].num_closures,
                     change=float(changes[index]),

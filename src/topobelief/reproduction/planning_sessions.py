@@ -77,7 +77,7 @@ class ActionRow:
     Attributes
     ----------
     session, xi, seed, action
-        Which one; actions count from 1, the shortest path first.
+        Which one, from 0, the shortest path first.
     length
         Metres.
     num_poses, num_new_poses, num_closures
@@ -194,7 +194,7 @@ def action_rows(session: PlanningSession) -> list[ActionRow]:
             session=session.name,
             xi=session.xi,
             seed=session.seed,
-            action=index + 1,
+            action=index,
             length=path_length(path),
             num_poses=graph.num_poses + action.num_new_poses,
             num_new_poses=action.num_new_poses,

@@ -94,7 +94,7 @@ def real_action_rows(path: Path, num_actions: int, seed: int, *, largest_spectru
             num_poses=graph.num_poses,
             num_edges=graph.num_edges,
             tangent_dim=graph.tangent_dim,
-            action=index + 1,
+            action=index,
             num_new_poses=action.num_new_poses,
             num_closures=action.num_closures,
             **{name: float(values[index]) for name, values in columns.items()},

@@ -1,24 +1,23 @@
-"""Strategies compared over seeds, in processes of their own, seed by seed, and what is there is not driven again."""
+"""Strategies compared on a scenario over many seeds, as a run: a seed is a task, and its result one run for each strategy."""
 
 from __future__ import annotations
 
-import csv
-import io
-import signal
-from collections.abc import Callable, Generator, Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
-from dataclasses import asdict, astuple, dataclass, fields, replace
-from multiprocessing import get_context
+from dataclasses import asdict, dataclass, fields, replace
+from hashlib import blake2b
+from importlib.metadata import version
 from pathlib import Path
 
-from topobelief.errors import FileError, InvalidInputError
-from topobelief.io.files import StrPath, read_text, write_text
+from topobelief.errors import InvalidInputError
+from topobelief.io.row_files import json_rows, rows_of_json
+from topobelief.runs.attempt import Executor
+from topobelief.runs.journal import Journal
+from topobelief.runs.lock import alone
+from topobelief.runs.run import OnProgress, UnfinishedRunError, run_tasks
 from topobelief.simulation.comparison import ComparedRun, compared_records, compared_run
+from topobelief.simulation.noise import InjectedNoise
 from topobelief.simulation.record import RunOptions
+from topobelief.simulation.scenario import Scenario
 from topobelief.simulation.scenario_file import scenario_of, with_detour
-
-_READERS: dict[str, Callable[[str], object]] = {"int": int, "str": str, "float": float}  # by annotation
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,76 +43,116 @@ class ComparisonTask:
     options: RunOptions
     num_redraws: int
 
+    def __post_init__(self) -> None:
+        _ = self.noise
+
+    @property
+    def noise(self) -> InjectedNoise:
+        """What is redrawn.
+
+        Raises
+        ------
+        InvalidInputError
+            For physical noise.
+        """
+        if self.options.noise is None:
+            raise InvalidInputError("expected injected noise to redraw, got physical noise, of which there is one draw a run")
+        return self.options.noise
+
     def described(self) -> dict[str, object]:
         """For JSON, and to tell whether two tasks are the same."""
         plain = asdict(self)
         return {**plain, "strategies": list(self.strategies)}
 
 
-def play(task: ComparisonTask, seed: int) -> list[ComparedRun]:
-    """All strategies on one seed.
+@dataclass(frozen=True, slots=True)
+class SeedTask:
+    """One seed of a comparison."""
 
-    Raises
-    ------
-    InvalidInputError
-        For physical noise.
+    comparison: ComparisonTask
+    seed: int
+
+    @property
+    def id(self) -> str:
+        """Of this comparison's seeds, it alone."""
+        return f"seed {self.seed}"
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """What a comparison found.
+
+    Attributes
+    ----------
+    task
+    runs
+        By seed, then in the order of the strategies.
+    failed
+        Why seeds failed, by seed; they have no runs.
+    num_seeds_now
+        Driven by this call; the others were in the folder.
     """
-    noise = task.options.noise
-    if noise is None:
-        raise InvalidInputError("expected injected noise to redraw, got physical noise, of which there is one draw a run")
-    scenario = with_detour(scenario_of(task.scenario), task.max_detour)
-    records = compared_records(scenario, replace(task.options, seed=seed), task.strategies)
-    return [compared_run(record, noise, num_redraws=task.num_redraws) for record in records]
+
+    task: ComparisonTask
+    runs: tuple[ComparedRun, ...]
+    failed: dict[int, str]
+    num_seeds_now: int
 
 
-def played(task: ComparisonTask, seeds: list[int], *, num_workers: int) -> Iterator[list[ComparedRun]]:
-    """Seed by seed, as they are done."""
-    if num_workers == 1:
-        yield from (play(task, seed) for seed in seeds)
-        return
-    with _pool(num_workers) as pool:
-        for future in as_completed([pool.submit(play, task, seed) for seed in seeds]):
-            yield future.result()
+def play(task: SeedTask) -> list[ComparedRun]:
+    """All strategies on one seed."""
+    comparison = task.comparison
+    scenario = with_detour(scenario_of(comparison.scenario), comparison.max_detour)
+    records = compared_records(scenario, replace(comparison.options, seed=task.seed), comparison.strategies)
+    return [compared_run(record, comparison.noise, num_redraws=comparison.num_redraws) for record in records]
 
 
-@contextmanager
-def _pool(num_workers: int) -> Generator[ProcessPoolExecutor]:
-    """Processes that leave Ctrl-C to this one; where the block fails, tasks that have not begun are dropped."""
-    pool = ProcessPoolExecutor(
-        num_workers,
-        mp_context=get_context("spawn"),
-        initializer=signal.signal,
-        initargs=(signal.SIGINT, signal.SIG_IGN),
-    )
-    try:
-        yield pool
-    finally:
-        pool.shutdown(cancel_futures=True)
+def compare(
+    task: ComparisonTask,
+    num_seeds: int,
+    folder: Path,
+    executor: Executor,
+    *,
+    retry_failed: bool = False,
+    on_progress: OnProgress = lambda _: None,
+) -> Comparison:
+    """Drive all seeds that the folder does not have yet.
 
-
-def write_runs(path: StrPath, runs: list[ComparedRun]) -> None:
-    """Runs as CSV, a line each, whole or not at all."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([field.name for field in fields(ComparedRun)])
-    writer.writerows(astuple(run) for run in sorted(runs, key=lambda run: run.seed))
-    write_text(path, text.getvalue())
-
-
-def read_runs(path: StrPath) -> list[ComparedRun]:
-    """What `write_runs` wrote.
+    Parameters
+    ----------
+    task
+    num_seeds
+        Seeds are 0, 1, ... A later call may ask for more.
+    folder
+        Where the journal is kept; made where there is none.
+    executor
+    retry_failed
+        Whether seeds that failed earlier are driven again.
+    on_progress
+        Called at the start and after each seed.
 
     Raises
     ------
     FileError
-        Names the file and the line.
+        Where the folder holds another comparison, another process is using it, or it cannot be written to.
+    UnfinishedRunError
+        Where every seed failed.
     """
-    rows = csv.DictReader(io.StringIO(read_text(path)))
-    readers = {field.name: _READERS[str(field.type)] for field in fields(ComparedRun)}
-    runs: list[ComparedRun] = []
-    for row in rows:
-        try:
-            runs.append(ComparedRun(**{name: read(row[name]) for name, read in readers.items()}))  # pyright: ignore[reportArgumentType]
-        except (KeyError, TypeError, ValueError) as error:
-            raise FileError(Path(path), f"expected a compared run, got a bad value: {error}", line=rows.line_num) from None
-    return runs
+    scenario = with_detour(scenario_of(task.scenario), task.max_detour)
+    settings = {**task.described(), "content": _digest(scenario), "topobelief": version("topobelief")}
+    tasks = [SeedTask(task, seed) for seed in range(num_seeds)]
+    with alone(folder):
+        journal: Journal[SeedTask, list[ComparedRun]] = Journal(folder / "journal.jsonl", settings, json_rows)
+        outcome = run_tasks(tasks, play, journal, executor, retry_failed=retry_failed, on_progress=on_progress)
+    errors = {each.seed: journal.error(each.id) for each in tasks}
+    failed = {seed: error for seed, error in errors.items() if error is not None}
+    if len(failed) == num_seeds:
+        raise UnfinishedRunError(f"expected seeds that can be driven, got {num_seeds} that failed, the first with {failed[0]}")
+    runs = [run for each in tasks if each.seed not in failed for run in rows_of_json(ComparedRun, journal.result(each.id))]
+    return Comparison(task, tuple(runs), failed, outcome.num_done_now)
+
+
+def _digest(scenario: Scenario) -> str:
+    """Of all that a scenario's name or file stands for."""
+    rest = [getattr(scenario, field.name) for field in fields(Scenario) if field.name != "world"]
+    return blake2b(f"{scenario.world.digest} {rest}".encode(), digest_size=16).hexdigest()

@@ -1,4 +1,4 @@
-"""The k-th shortest path, for experiments in which the choice is given: "path-1", "path-2", …"""
+"""The path of a given label, for experiments in which the choice is given: "path-0", the shortest, "path-1", …"""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from topobelief.strategies.question import Question
 
 
 def path_k(name: str, question: Question) -> Answer:
-    """The k-th shortest, or the longest where there are fewer."""
-    place = int(name.removeprefix("path-"))
+    """The one that k are shorter than, or the longest where there are fewer."""
+    label = int(name.removeprefix("path-"))
     order = np.argsort(question.lengths, kind="stable")
-    return int(order[min(place, len(order)) - 1]), Reasons
+    return int(order[min(label, len(order) - 1)]), Reasons

@@ -23,7 +23,7 @@ _PATH_K = "topobelief.strategies.path_k:path_k"
 
 
 def place_of(name: str) -> str:
-    """Module and function of one of `STRATEGIES`, or of "path-k": the k-th shortest candidate (the last, if there are fewer).
+    """Module and function of one of `STRATEGIES`, or of "path-k": the k-th shortest candidate from 0 (the last, if fewer).
 
     Raises
     ------
@@ -32,9 +32,9 @@ def place_of(name: str) -> str:
     """
     if name in STRATEGIES:
         return STRATEGIES[name]
-    if re.fullmatch(r"path-[1-9][0-9]*", name):
+    if re.fullmatch(r"path-(0|[1-9][0-9]*)", name):
         return _PATH_K
-    raise InvalidInputError(f'expected a strategy of {", ".join(STRATEGIES)}, or path-1, path-2, …, got "{name}"')
+    raise InvalidInputError(f'expected a strategy of {", ".join(STRATEGIES)}, or path-0, path-1, …, got "{name}"')
 
 
 def checked_strategy(name: str) -> str:

@@ -6,14 +6,14 @@ and takes it at once: so a row is there or not, never twice and never in half, f
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable
-from contextlib import contextmanager
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from topobelief.errors import FileError
 from topobelief.io.files import atomic_file
 from topobelief.optional import load
+from topobelief.runs.attempt import Finished
 from topobelief.study.rows import COLUMNS, KEY, UNREPEATABLE, ColumnType
 from topobelief.study.session import Row
 from topobelief.study.tasks import Task
@@ -58,10 +58,10 @@ class Dataset:
     def __len__(self) -> int:
         return len(self._status)
 
-    def __contains__(self, task: str) -> bool:
+    def __contains__(self, task: str, /) -> bool:
         return task in self._status
 
-    def failed(self, tasks: Iterable[str]) -> int:
+    def failed(self, tasks: Iterable[str], /) -> int:
         """How many of the tasks have a row that says that they failed."""
         return sum(self._status.get(task) == "failed" for task in tasks)
 
@@ -82,14 +82,15 @@ class Dataset:
                     f"expected rows of this study, got one of another map, session or rule for {what}; choose another --out",
                 )
 
-    def add(self, row: Row) -> None:
-        """Write one row.
+    def add(self, finished: Finished[Task, Row], /) -> None:
+        """Write its row.
 
         Raises
         ------
         FileError
             If it cannot be written, or its task has a row.
         """
+        row = row_of(finished)
         path = next(iter(self._files), self._folder / f"part-{self._next:06}.parquet")
         self._know(row, path)
         self._write(path, [*self._files.get(path, []), row])
@@ -132,6 +133,13 @@ class Dataset:
             self._files.pop(path, None)
 
 
+def row_of(finished: Finished[Task, Row]) -> Row:
+    """All columns, null where there is nothing to say."""
+    task, outcome = finished.task, finished.outcome
+    row = dict.fromkeys(COLUMNS) | {"task": task.id, **task.labels, **(outcome.result or {})}
+    return row | {"status": "failed" if finished.failed else "ok", "error": outcome.error, "attempts": finished.attempts}
+
+
 def read_table(folder: Path) -> Table:
     """All rows, sorted by their combination, whatever the order in which they came.
 
@@ -151,41 +159,6 @@ def read_table(folder: Path) -> Table:
 def repeatable(table: Table) -> Table:
     """The columns that are the same in every run of the same study."""
     return table.drop_columns(list(UNREPEATABLE))
-
-
-@contextmanager
-def alone(folder: Path) -> Generator[None]:
-    """Keep other runs from the folder; the operating system lifts this however the run ends.
-
-    Raises
-    ------
-    FileError
-        Where another run is at work, or the folder cannot be made.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        file = (folder / ".lock").open("w")
-    except OSError as error:
-        raise FileError(folder, f"expected a folder to write to, got: {error.strerror}; choose another --out") from None
-    with file:
-        if not _locked(file.fileno()):
-            raise FileError(folder, "expected a study at rest, got one that another process is running; wait for it")
-        yield
-
-
-def _locked(descriptor: int) -> bool:
-    """Whether this process has the lock; also where the system knows none."""
-    try:
-        import fcntl
-    except ImportError:  # Windows
-        return True
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError:  # some network file systems
-        return True
-    return True
 
 
 def _read(path: Path, arrow: Any) -> Table:

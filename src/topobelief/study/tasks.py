@@ -74,7 +74,7 @@ def _of_seed(specification: Specification, seed: int) -> Iterator[Task]:
     for session, names in specification.sessions:
         for name in names:
             world = specification.worlds[name]
-            place = _digest(_world_digest(world), _session_content(session), rule.content)
+            place = _digest(world.digest, _session_content(session), rule.content)
             for noise in specification.noises:
                 for objective in specification.objectives:
                     for strategy in specification.strategies:
@@ -85,10 +85,6 @@ def _of_seed(specification: Specification, seed: int) -> Iterator[Task]:
 def _digest(*content: object) -> str:
     text = json.dumps(content, sort_keys=True)
     return blake2b(text.encode(), digest_size=16).hexdigest()
-
-
-def _world_digest(world: World) -> str:
-    return blake2b(world.free.wkb + np.array(world.bounds).tobytes(), digest_size=16).hexdigest()
 
 
 def _session_content(session: Session) -> list[object]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from hashlib import blake2b
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -158,6 +159,11 @@ class World:
             For a graph in SE(3), whose storeys a plane would join, and for a width that is not positive.
         """
         return cls(region_of_trajectory(graph, width))
+
+    @cached_property
+    def digest(self) -> str:
+        """32 hexadecimal digits, the same for worlds of the same free region and bounds."""
+        return blake2b(self.free.wkb + np.array(self.bounds).tobytes(), digest_size=16).hexdigest()
 
     @cached_property
     def _region(self) -> shapes.Region:

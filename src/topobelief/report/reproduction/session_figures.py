@@ -68,7 +68,7 @@ def draw_uncertainty(pairs: Sequence[tuple[TrajectoryUncertainty, TrajectoryUnce
             for column, (word, each) in enumerate(zip(("best", "worst"), pair, strict=True)):
                 action = each.session.actions[each.action]
                 title = (
-                    f"{each.session.name}, {word}: path {each.action + 1}, J = {each.entropy:.0f} nats, "
+                    f"{each.session.name}, {word}: path {each.action}, J = {each.entropy:.0f} nats, "
                     f"{action.num_new_poses} new poses, {action.num_closures} closures"
                 ).replace("-", "\N{MINUS SIGN}")
                 _draw_belief(grid.panel(row, column, title), each)

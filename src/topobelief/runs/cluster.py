@@ -1,22 +1,25 @@
-"""A dask.distributed cluster that plays tasks: its scheduler hands them out, and workers may come, go and die."""
+"""A dask.distributed cluster that works on tasks: its scheduler hands them out, and workers may come, go and die."""
 
 from __future__ import annotations
 
 import logging
+import os
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from importlib.metadata import version
+from threading import Timer
 from typing import Any
 from uuid import uuid4
 
 from topobelief.errors import InvalidInputError, TopobeliefError
 from topobelief.optional import load
-from topobelief.study.attempt import Finished, Outcome, Play, attempt, with_second_chance
-from topobelief.study.tasks import Task
+from topobelief.runs.attempt import MAX_SECONDS, Finished, Outcome, R, T, Work, attempt, checked_seconds, with_second_chance
 
 _PATIENCE = 15  # seconds to wait for the scheduler, and for its first worker
-_DEATH = "WorkerDiedError: several workers of the cluster died over it, the last ones when nothing else was running"
-_MAX_WITH_SCHEDULER = 500  # tasks, each with its world; more than most clusters play at a time
+_DEATH = (
+    "WorkerDiedError: several workers of the cluster died over it or took too long, the last ones when nothing else was running"
+)
+_MAX_WITH_SCHEDULER = 500  # tasks, each with its world; more than most clusters work on at a time
 
 
 class ClusterLostError(TopobeliefError):
@@ -24,25 +27,28 @@ class ClusterLostError(TopobeliefError):
 
 
 class Cluster:
-    """The workers of a scheduler.
+    """An executor of the workers of a scheduler.
 
     Parameters
     ----------
     address
         Such as "tcp://10.0.0.1:8786".
+    max_seconds
+        After which a worker that has not finished its task ends itself, to be replaced by its nanny. None for no limit.
 
     Raises
     ------
     InvalidInputError
-        If distributed is not installed.
+        If distributed is not installed, or for a limit that is not above 0.
     """
 
-    def __init__(self, address: str) -> None:
+    def __init__(self, address: str, *, max_seconds: float | None = MAX_SECONDS) -> None:
         self.address = address
+        self._max_seconds = checked_seconds(max_seconds)
         self._distributed = load("distributed", "cluster")
 
-    def run(self, play: Play, tasks: Sequence[Task]) -> Generator[Finished]:
-        """Play all tasks and give each once, as they finish; closing it early withdraws the rest.
+    def run(self, work: Work[T, R], tasks: Sequence[T]) -> Generator[Finished[T, R]]:
+        """Work on all tasks and give each once, as they finish; closing it early withdraws the rest.
 
         The scheduler gives a task whose worker died to another one, a few times; should it then give up, the task has a
         second chance when nothing else is running.
@@ -57,7 +63,7 @@ class Cluster:
         if not tasks:
             return
         with self._client() as client:
-            yield from with_second_chance(lambda some: self._played(client, play, some), tasks)
+            yield from with_second_chance(lambda some: self._finished(client, work, some), tasks)
 
     @contextmanager
     def _client(self) -> Generator[Any]:
@@ -75,43 +81,57 @@ class Cluster:
             finally:
                 client.close(timeout=_PATIENCE)
 
-    def _played(self, client: Any, play: Play, tasks: Sequence[Task]) -> Generator[Finished]:
+    def _finished(self, client: Any, work: Work[T, R], tasks: Sequence[T]) -> Generator[Finished[T, R]]:
         """Tasks as they finish; the scheduler itself begins one again whose worker died, a few times."""
-        run, todo = uuid4().hex[:8], iter(tasks)  # another run of the study shares no result
-        playing: dict[str, tuple[Task, Any]] = {}
+        run, todo = uuid4().hex[:8], iter(tasks)  # another run with the same tasks shares no result
+        pending: dict[str, tuple[T, Any]] = {}
         completed = self._distributed.as_completed(loop=client.loop)
 
         def hand_out() -> None:
-            while len(playing) < _MAX_WITH_SCHEDULER:
+            while len(pending) < _MAX_WITH_SCHEDULER:
                 task = next(todo, None)
                 if task is None:
                     return
-                future = client.submit(attempt, play, task, key=f"topobelief-{run}-{task.id}", pure=False)
-                playing[future.key] = task, future
+                key = f"topobelief-{run}-{task.id}"
+                future = client.submit(_attempt_in_time, work, task, self._max_seconds, key=key, pure=False)
+                pending[future.key] = task, future
                 completed.add(future)
 
         try:
             hand_out()
             for future in completed:
-                task, _ = playing.pop(future.key)
+                task, _ = pending.pop(future.key)
                 yield Finished(task, self._outcome(future), attempts=1)
                 hand_out()
         finally:
-            if playing and client.status == "running":
-                client.cancel([future for _, future in playing.values()])
+            if pending and client.status == "running":
+                client.cancel([future for _, future in pending.values()])
 
-    def _outcome(self, future: Any) -> Outcome:
+    def _outcome(self, future: Any) -> Outcome[Any]:
         """What came out of a task; what it raised itself is in there already."""
         try:
             return future.result()
         except self._distributed.scheduler.KilledWorker:
-            return Outcome(None, _DEATH, worker_died=True)
+            return Outcome(None, _DEATH, worker_lost=True)
         except (self._distributed.CancelledError, OSError):  # OSError: the connection broke
             raise ClusterLostError(
                 f"expected the dask scheduler at {self.address} to stay, got disconnected; run the same command to continue"
             ) from None
         except Exception as error:  # such as a task that a worker cannot unpack
             return Outcome(None, f"{type(error).__name__}: {' '.join(str(error).split())}")
+
+
+def _attempt_in_time(work: Work[T, R], task: T, max_seconds: float | None) -> Outcome[R]:
+    """On a worker: an attempt that ends the worker's process where it takes too long, since nothing else stops a thread."""
+    if max_seconds is None:
+        return attempt(work, task)
+    timer = Timer(max_seconds, os._exit, [1])
+    timer.daemon = True
+    timer.start()
+    try:
+        return attempt(work, task)
+    finally:
+        timer.cancel()
 
 
 @contextmanager

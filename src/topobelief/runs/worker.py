@@ -1,6 +1,6 @@
-"""A process that plays tasks: they come pickled on standard input, outcomes go back on standard output.
+"""A process that works on tasks: they come pickled on standard input, outcomes go back on standard output.
 
-Run as `python -m topobelief.study.worker`; it ends when its input does, so it does not outlive the study.
+Run as `python -m topobelief.runs.worker`; it ends when its input does, so it does not outlive the run.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import pickle
 import sys
 from typing import IO
 
-from topobelief.study.attempt import attempt
+from topobelief.runs.attempt import attempt
 
 READY = "ready"
 """What a worker says first."""
@@ -25,9 +25,9 @@ def serve() -> None:
     try:
         _send(answers, READY)
         while True:
-            play, task = pickle.load(sys.stdin.buffer)
-            _send(answers, attempt(play, task))
-    except (EOFError, BrokenPipeError):  # the study is over, or gone
+            work, task = pickle.load(sys.stdin.buffer)
+            _send(answers, attempt(work, task))
+    except (EOFError, BrokenPipeError):  # the run is over, or gone
         pass
 
 
