@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from topobelief.arrays import BoolArray, FloatArray
+from topobelief.conversions.gtsam import load_gtsam
 from topobelief.errors import InvalidInputError
 from topobelief.geometry import SE2_GROUP
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.io.gtsam import load_gtsam
 from topobelief.simulation.factor import CLOSURE, Factor
 
 _PRIOR_SIGMA = 1e-4  # m and rad
