@@ -267,3 +267,31 @@ def expand_blocks(
                 for d in range(b):
                     blocks.rows[q, 0, c, d] += blocks.rows[q, 1, c, d]
             blocks.ends[q, 1] = -1
+
+
+@compiled
+def reduce_extension(
+    extensions: Extensions, k: int, rows_i: FloatArray, rows_j: FloatArray, shift: float
+) -> tuple[float, float, Blocks, FloatArray, IntArray]:
+    """The whole reduction of one extension.
+
+    Returns
+    -------
+    log_det, condition
+        As `eliminate_forest` returns them.
+    blocks
+        On existing nodes alone. There is room for more than are used: their number is the length of `widths`.
+    rows, widths
+        As `expand_blocks` writes them.
+    """
+    r, b = rows_i.shape[1], rows_i.shape[2]
+    num_edges = int(extensions.edge_start[k + 1] - extensions.edge_start[k])
+    num_new = int(extensions.node_start[k + 1] - extensions.node_start[k])
+    forest = new_forest(num_new, b, shift)
+    blocks = new_blocks(2 * num_edges if r > b or shift > 0 else num_edges - num_new, b)
+    count = reduce_closures(extensions, k, rows_i, rows_j, forest, blocks)
+    log_det, condition, count = eliminate_forest(extensions, k, rows_i, rows_j, forest, blocks, count)
+    columns = compress_forest(extensions, k, forest, blocks, count) if count > 0 else 0
+    rows, widths = np.zeros((count * b, columns * b)), np.zeros(count, np.int64)
+    expand_blocks(extensions, k, forest, blocks, count, rows, widths)
+    return log_det, condition, blocks, rows, widths
