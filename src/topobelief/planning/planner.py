@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from importlib.util import find_spec
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -28,7 +27,7 @@ from topobelief.graph.fit import warn_of_misfit
 from topobelief.graph.information import SAME_NOISE, shared_information
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.graph.topology import checked_anchor
-from topobelief.optional import missing_packages
+from topobelief.optional import has_kernels, missing_packages
 from topobelief.planning.batch import Batch, Criteria
 from topobelief.planning.decision import Decision
 from topobelief.planning.engine import Engine
@@ -118,7 +117,7 @@ class Planner:
         require_choice("signature", signature, SIGNATURES)
         require_choice("bounds", bounds, (*BOUNDS, AUTO))
         require_choice("engine", engine, (*ENGINES, AUTO))
-        if engine == "incremental" and not _has_kernels():
+        if engine == "incremental" and not has_kernels():
             raise missing_packages(["numba"], ["fast"])
         self._criteria = Criteria(objective, signature, bounds, BoundOptions(determinant, window), normalized)
         self._given_anchor, self._given_engine = anchor, engine
@@ -277,7 +276,7 @@ class Planner:
         if name == AUTO:
             large = num_actions * self._graph.num_edges >= _INCREMENTAL_WORK
             worthwhile = large or self._criteria.bounds in ("anchored", "chain")
-            name = "incremental" if worthwhile and _has_kernels() else "scratch"
+            name = "incremental" if worthwhile and has_kernels() else "scratch"
         if name not in self._engines:
             self._engines[name] = chosen(ENGINES, name)(self._graph, self._anchor)
         return self._engines[name]
@@ -322,11 +321,6 @@ def _cheapest_bounds(engine: Engine, criteria: Criteria, actions: Sequence[Actio
     costs = np.array([action.cost for action in sample])
     num_open = np.count_nonzero(lower + costs <= (upper + costs).min()) - 1  # without the best
     return "fischer" if num_open <= _OPEN_SHARE * (len(sample) - 1) else "chain"
-
-
-def _has_kernels() -> bool:
-    """Whether what increments are compiled with is installed."""
-    return find_spec("numba") is not None
 
 
 def _check_limits(margin: float | None, proof: str, max_evaluations: int | None, deadline: float | None) -> None:

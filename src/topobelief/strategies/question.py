@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from importlib.util import find_spec
 
 from topobelief.arrays import FloatArray
 from topobelief.bounds.entropy_bounds import Determinant
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
+from topobelief.optional import has_kernels
 from topobelief.planning.planner import Planner
 
 
 def installed_bounds() -> str:
     """Bounds anchored in the prior where numba is installed, which compiles them; Fischer's otherwise."""
-    return "fischer" if find_spec("numba") is None else "anchored"
+    return "anchored" if has_kernels() else "fischer"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
