@@ -142,20 +142,23 @@ class World:
 
     @classmethod
     def from_trajectory(cls, graph: PoseGraph, width: float | None = None) -> World:
-        """Free where the robot has been: within `width` of its odometry, for a pose graph that has no map.
+        """For a pose graph without a map: free where the robot has been, within `width` of its odometry.
 
         Parameters
         ----------
         graph
-            In SE(2), at its estimate. The robot has been at its poses and, where an edge joins two consecutive poses,
-            on the segment between them. Edges between other poses (closures) say nothing of what lies between.
+            In SE(2), at its estimate. The robot has been at its poses and, where an edge joins two poses of consecutive
+            index (odometry), on the segment between them. Edges between other poses (closures) say nothing of what lies
+            between, and neither do two consecutive poses that no edge joins. A pose without odometry is free within a disc
+            of its own; in a graph without any odometry all poses are, and the default width is refused.
         width
-            Metres to each side. Default: twice the edge length on which the robot covered its median metre.
+            Metres to each side. Default: twice the length of the odometry edge on which the robot covered its median metre.
 
         Raises
         ------
         InvalidInputError
-            For a graph in SE(3), whose storeys a plane would join, and for a width that is not positive.
+            For a graph in SE(3), whose storeys a plane would join; for a width that is not positive; for the default width
+            where no odometry edge has a length.
         """
         return cls(region_of_trajectory(graph, width))
 
