@@ -1,4 +1,4 @@
-"""What can go wrong, one root: every error that topobelief raises on purpose is a `TopobeliefError`.
+"""The errors of the package: every error that topobelief raises on purpose is a `TopobeliefError`.
 
 A message says what was expected and what was found, names the place (file and line, edge, node, action),
 and then what to do. The values that it names are attributes too, so that a program need not parse text.

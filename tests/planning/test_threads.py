@@ -78,7 +78,7 @@ def test_a_planner_may_be_asked_while_it_tells_of_progress():
     graph, actions = session(3)
     planner = Planner(graph)
     expected = planner.decide(actions, proof="optimal").to_dict()
-    told = []
-    found = planner.decide(actions, proof="optimal", on_progress=lambda *_: told.append(planner.decide(actions[:1]).best))
+    choices = []
+    found = planner.decide(actions, proof="optimal", on_progress=lambda *_: choices.append(planner.decide(actions[:1]).best))
     assert found.to_dict() == expected
-    assert set(told) == {0}
+    assert set(choices) == {0}

@@ -191,7 +191,7 @@ def test_a_contact_ends_the_leg_and_the_run_with_its_reason(house):
 
 @pytest.mark.parametrize(("name", "seed"), [("depot", 7108), ("tb3_sandbox", 7105)])
 def test_a_robot_among_table_legs_and_pillars_arrives_where_it_believes_to_be(name, seed):
-    """It once caught on a leg, let its wheels spin, and was told to have arrived, 7.6 and 0.7 m from the goal."""
+    """It once caught on a leg, let its wheels spin, and was reported as arrived, 7.6 and 0.7 m from the goal."""
     record = Episode(scenario_of(str(case_file(f"scenarios/{name}.yaml"))), RunOptions(seed=seed)).run()
     assert [leg.outcome for leg in record.legs] == [ARRIVED, ARRIVED]
     for leg in record.legs:

@@ -1,1 +1,1 @@
-"""Pose graphs to and from the objects of other libraries, a library a file."""
+"""Pose graphs to and from the objects of other libraries, one file per library."""

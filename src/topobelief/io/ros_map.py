@@ -41,7 +41,7 @@ _DAMAGE = (ArithmeticError, EOFError, LookupError, NotImplementedError, SyntaxEr
 _MAX_PIXELS = 150_000_000  # some 1.2 GB and 8 s
 _SMALLEST_RESOLUTION, _LARGEST_RESOLUTION = 1e-6, 1e6  # metres a pixel
 _COARSE = 2.0  # metres a pixel, above which millimetres are more likely
-_MAX_CELLS_AWAY = 1e9  # from the origin of the world, at which coordinates still tell a millionth of a cell
+_MAX_CELLS_AWAY = 1e9  # from the origin of the world, at which coordinates still resolve a millionth of a cell
 
 
 def read_ros_map(path: StrPath, *, unknown: Unknown = "occupied") -> World:

@@ -2,7 +2,7 @@
 
 Blocks of I + R are needed between closures of one window, and those of the other rows (not the first ones of each closure)
 between all. The other rows of a form's closures touch the other variables of a node alone: in the joint information matrix,
-rotations see rotations.
+rotation rows touch rotations only.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def _add_chain(
     sizes: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Conditional covariances along the path into out[5], what their error is proportional to into out[6]."""
+    """Add ln det of the conditional covariances to out[5], and what their error is proportional to to out[6]."""
     b, count = blocks.rows.shape[2], len(order)
     band = np.zeros((count, window + 1, b, b))  # blocks of I + R between each closure and those before it
     gram = np.empty((b, b))

@@ -1,8 +1,8 @@
 """Kernels that reduce one extension of a graph to what couples it to the graph: rows on unit noise and on existing nodes.
 
 Everything works on rows, by Householder reflections, so that no digits are lost to differences: closures become square; the
-forest of new nodes is eliminated from its leaves to where it hangs; its nodes without closures are skipped; each closure is
-written as rows on the independent unit noise of the nodes that are left and on existing nodes.
+forest of new nodes is eliminated from its leaves to the nodes that it is attached to; its nodes without closures are skipped;
+each closure is written as rows on the independent unit noise of the nodes that are left and on existing nodes.
 
 Notation: b variables a node, r >= b rows an edge; an eliminated node is x = F x_parent + N noise. `new` counts an extension's
 new nodes from 0. A block is b rows on one or two nodes.
@@ -111,7 +111,7 @@ def leave_rest(
 def reduce_closures(
     extensions: Extensions, k: int, rows_i: FloatArray, rows_j: FloatArray, forest: Forest, blocks: Blocks
 ) -> int:
-    """Closures as blocks; what is more than b rows stands on one end alone, a new one if there is one. Returns their number."""
+    """Closures as blocks; rows beyond b touch one end alone, a new one if there is one. Returns their number."""
     r, b = rows_i.shape[1], rows_i.shape[2]
     n, first_new = extensions.num_existing, extensions.node_start[k]
     work, count = np.empty((r, 2 * b)), 0
@@ -273,7 +273,7 @@ def expand_blocks(
 def reduce_extension(
     extensions: Extensions, k: int, rows_i: FloatArray, rows_j: FloatArray, shift: float
 ) -> tuple[float, float, Blocks, FloatArray, IntArray]:
-    """The whole reduction of one extension.
+    """The steps above for one extension, in their order.
 
     Returns
     -------

@@ -1,7 +1,7 @@
 """Strong rows apart: what a few rows that are far stronger than the others do to a matrix, and how to avoid it.
 
-A row whose square is 1e12 among others of 1 leaves them four digits in the Gram matrix M. So strong rows are weakened to the
-strength of the others before M is formed, and what they lack is added afterwards (docs, the mathematics, section 10):
+Where one row has the square 1e12 and the others 1, the Gram matrix M keeps four digits of the others. So strong rows are scaled
+down to the strength of the others before M is formed, and the rest is added afterwards (docs, the mathematics, section 10):
 
     M = M_0 + A^T A,        M_0 with f r in place of each strong row r,        A the rows sqrt(1 - f^2) r,
 
@@ -26,7 +26,7 @@ _MAX_STRONG_ROWS = 200  # each costs a solution with the factor
 
 @dataclass(frozen=True, slots=True)
 class StrongRows:
-    """A form whose strong rows are weakened, and what these lack.
+    """A form whose strong rows are scaled down, and the rest of these rows.
 
     Attributes
     ----------

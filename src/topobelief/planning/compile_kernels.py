@@ -1,7 +1,7 @@
 """Compile every kernel before the first decision needs it: `python -m topobelief.planning.compile_kernels`.
 
-Kernels are compiled for the types of argument that they meet, once a machine, and kept on disk (see `linalg.compiled`). A tiny
-decision of each kind meets them all; it takes half a minute, or an instant if it has been done before.
+Kernels are compiled for the types of argument that they meet, once per machine, and kept on disk (see `linalg.compiled`). A
+tiny decision of each kind uses all of them; it takes half a minute, or an instant if it has been done before.
 """
 
 from __future__ import annotations

@@ -5,8 +5,8 @@ Notation: U* the action of least entropy, U^ the one of largest signature.
     epsilon = |J(U*) - J(U^)|
     gamma   = min over monotone f with f(s(U^)) = J(U^) of max over U of |J(U) - f(s(U))|
 
-f decreases in s. Fitting it is minimax isotonic regression with one point pinned, which has a closed form: half of the worst
-order violation between two actions, or the whole of it where the pinned action takes part.
+f decreases in s. Fitting it is minimax isotonic regression with f prescribed at one point, which has a closed form: half of the
+worst violation of the order between two actions, or the whole of it where the chosen action is one of them.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ Notation: s signature, U^ = argmax s, LB and UB the bounds of the objective J pl
     margin given:      U^ alone if UB(U^) < margin, else all actions in ranking order
     margin not given:  Delta J_max = max(0, UB(U^) - min of LB over the others),   A = {U : LB(U) <= UB(U^)} and U^
 
-The paper has < in A; where bounds meet, a strict test would lose the winner. The theorem holds for any U^, so for one chosen
+The paper has < in A; where bounds meet, a strict test would drop U^ itself. The theorem holds for any U^, so for one chosen
 by a von Neumann signature too. The proof evaluates J along the ranking and skips what its lower bound rules out.
 """
 
@@ -45,7 +45,7 @@ Proof = Literal["none", "bounded", "optimal"]
 class Planner:
     """Chooses among actions on one pose graph.
 
-    Threads may share a planner. In pickles and copies it is one that has factored nothing yet.
+    Threads may share a planner. A pickled or copied planner has factored nothing yet.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ class Planner:
     Raises
     ------
     InvalidInputError
-        For an unknown choice, or a dense spectrum that was not asked for twice.
+        For an unknown choice, or a dense spectrum above 3000 poses without `allow_dense_spectrum`.
     DisconnectedGraphError
         Names the poses that the anchor does not reach.
 
@@ -208,9 +208,9 @@ class Planner:
             "none": signatures only. "bounded": bounds of all actions. "optimal": exact evaluations along the ranking until
             no bound is below the best value found.
         max_evaluations
-            Stop the proof after this many exact evaluations, with the certificate reached.
+            Maximum number of exact evaluations; the decision then has the certificate reached so far.
         deadline
-            Seconds from now, checked between actions. A ranking always comes back; bounds and evaluations may be missing.
+            Seconds from now, checked between actions. A ranking is always returned; bounds and evaluations may be missing.
         on_progress
             Called after each action of each stage.
 

@@ -22,7 +22,7 @@ from topobelief.world import World
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LidarSettings:
-    """A lidar that looks all around, in revolutions that are over in no time.
+    """A lidar with a view of 360 degrees, whose revolutions take no time.
 
     Parameters
     ----------

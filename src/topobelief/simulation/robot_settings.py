@@ -1,4 +1,4 @@
-"""The robot's size, its motors, and what its wheel encoders get wrong."""
+"""The robot's size, its motors, and the errors of its wheel encoders."""
 
 from __future__ import annotations
 

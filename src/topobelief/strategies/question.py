@@ -1,4 +1,4 @@
-"""A decision to make, as every strategy gets it."""
+"""A decision to make, in the form in which every strategy gets it."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Question:
     lengths : shape (K,)
         Of the paths, metres.
     random_scores : shape (K,)
-        Random numbers drawn by whoever asks; "random" takes the action with the largest. So strategies draw nothing themselves.
+        Random numbers drawn by the caller; "random" takes the action with the largest. Strategies draw none themselves.
     objective, bounds, determinant
         As the planner takes them. Default of the bounds: `installed_bounds`.
     """
@@ -45,7 +45,7 @@ class Question:
     determinant: Determinant = "cholesky"
 
     def planner(self, signature: str = "spanning_trees") -> Planner:
-        """For this question; dense spectra are allowed, since whoever asks named the strategy."""
+        """For this question; dense spectra are allowed, since the caller named the strategy."""
         return Planner(
             self.graph,
             objective=self.objective,

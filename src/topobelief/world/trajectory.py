@@ -1,6 +1,6 @@
 """The region that a robot is known to have driven through: all that lies within a width of its trajectory.
 
-Real pose graphs come without a map; where the robot has been, it can go again. The region is the union of one
+Real pose graphs come without a map, but where the robot has been, it can drive again. The region is the union of one
 capsule (a segment with round ends) for each step of the odometry.
 """
 
@@ -63,7 +63,7 @@ def default_width(graph: PoseGraph) -> float:
     travelled = np.cumsum(lengths)
     if len(lengths) == 0 or travelled[-1] == 0:
         raise InvalidInputError(
-            "expected edges between consecutive poses to tell how wide the trajectory is, got none with a length; "
+            "expected edges between consecutive poses from which to take the width, got none with a length; "
             "give a width in metres"
         )
     return float(_WIDTH_PER_STEP * lengths[np.searchsorted(travelled, travelled[-1] / 2)])

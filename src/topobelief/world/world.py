@@ -1,6 +1,6 @@
 """A planar world as its free region: polygons with holes, whatever the world was made from.
 
-Boxes, polygons, an occupancy grid and a trajectory all end as the same thing, the open set of places that are free.
+Boxes, polygons, an occupancy grid and a trajectory all become the same thing, the open set of places that are free.
 Its boundary is everything that can be hit, so one exact distance (to the boundary) answers every question: the
 clearance of a point, whether a disc may move along a segment, whether two points see each other. What lies beyond
 the bounds is not free. Coordinates are metres in the world frame of the pose graph.
@@ -30,7 +30,7 @@ _EROSION_SLACK = 0.02  # of the radius: twice the error of an erosion
 
 @dataclass(frozen=True, eq=False, init=False)
 class World:
-    """The places that are free, and what moving and looking among them comes to.
+    """The places that are free, and answers to where a robot may move and what it can see among them.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ class World:
         """All places that the centre of a disc can be moved to from a point, slightly too large.
 
         The region is eroded by 0.98 of the radius, so whatever the component leaves out cannot be reached.
-        Its holes are the obstacles around which there are ways on both sides; walls that the disc cannot pass
+        Its holes are the obstacles that can be passed on both sides; walls that the disc cannot pass
         between are one hole, and those joined to the outside are none.
 
         Parameters
