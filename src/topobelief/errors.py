@@ -141,3 +141,9 @@ def require_choice(name: str, value: str, choices: Collection[str]) -> None:
     if value not in choices:
         listed = ", ".join(f'"{choice}"' for choice in choices)
         raise InvalidInputError(f"expected {name} to be one of {listed}, got {value!r}")
+
+
+def require_positive(name: str, value: float, *, unit: str = "") -> None:
+    """Raise `InvalidInputError` where `value` is not a finite number above 0."""
+    if not (math.isfinite(value) and value > 0):
+        raise InvalidInputError(f"expected {name} above 0{f' {unit}' if unit else ''}, got {value}")

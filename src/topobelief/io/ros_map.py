@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from PIL import Image, ImageFile, UnidentifiedImageError
 
 from topobelief.arrays import BoolArray, FloatArray
-from topobelief.errors import FileError, InvalidInputError, InvalidMapError, MapWarning
+from topobelief.errors import FileError, InvalidInputError, InvalidMapError, MapWarning, require_positive
 from topobelief.io.files import StrPath, atomic_file
 from topobelief.io.yaml_fields import Field, read_fields
 from topobelief.world import World
@@ -103,8 +103,7 @@ def write_ros_map(
     cells = np.asarray(occupancy)
     if cells.ndim != 2 or cells.size == 0 or not np.isin(cells, (-1, 0, 100)).all():
         raise InvalidInputError(f"expected cells of -1, 0 and 100, shape (rows, columns), got {cells.dtype} of {cells.shape}")
-    if not (math.isfinite(resolution) and resolution > 0):
-        raise InvalidInputError(f"expected a resolution above 0 m, got {resolution}")
+    require_positive("a resolution", resolution, unit="m")
     if len(origin) != 3 or not all(map(math.isfinite, origin)):
         raise InvalidInputError(f"expected a finite origin (x, y, yaw), got {origin}")
     if Path(path).suffix.lower() not in (".yaml", ".yml"):

@@ -152,7 +152,7 @@ def eliminate_forest(
         new = extensions.order[v] - first_new
         e = extensions.stem[extensions.order[v]]
         outward = extensions.edges[e, 1] == n + extensions.order[v]
-        parent = extensions.edges[e, 0 if outward else 1]
+        parent = int(extensions.edges[e, 0 if outward else 1])
         copy_block(rows_j[e] if outward else rows_i[e], work, 0, 0)
         copy_block(rows_i[e] if outward else rows_j[e], work, 0, b)
         num_rows = r

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from topobelief.arrays import FloatArray
-from topobelief.errors import InvalidInputError
+from topobelief.errors import InvalidInputError, require_positive
 from topobelief.geometry import SE2_GROUP
 from topobelief.graph.information import block_isotropic
 from topobelief.simulation.factor import CLOSURE, ODOMETRY, Factor
@@ -104,8 +104,7 @@ class FrontEndSettings:
             "encoder_sigma",
             "odometry_correspondence_distance",
         ):
-            if not (math.isfinite(value := getattr(self, name)) and value > 0):
-                raise InvalidInputError(f"expected {name} above 0, got {value}")
+            require_positive(name, getattr(self, name))
         if self.min_index_gap < 2:
             raise InvalidInputError(f"expected min_index_gap of at least 2, got {self.min_index_gap}")
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from topobelief.arrays import IntArray
-from topobelief.errors import InvalidInputError
+from topobelief.errors import InvalidInputError, require_positive
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.world import shapes
 
@@ -38,8 +38,7 @@ def region_of_trajectory(graph: PoseGraph, width: float | None = None) -> shapes
         )
     if width is None:
         width = default_width(graph)
-    if not (np.isfinite(width) and width > 0):
-        raise InvalidInputError(f"expected a width above 0 m, got {width}")
+    require_positive("a width", width, unit="m")
     steps = odometry_steps(graph)
     alone = np.setdiff1d(np.arange(graph.num_poses), steps)
     starts, ends = graph.positions[steps[:, 0]], graph.positions[steps[:, 1]]
