@@ -165,7 +165,7 @@ def test_a_damaged_laser_does_not_stop_the_robot(house, lidar):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_how_a_blind_robot_ends_is_told_truly(house, seed):
+def test_the_end_of_a_blind_robot_is_reported_truly(house, seed):
     record = Episode(replace(house, lidar=LidarSettings(nan_share=1.0)), RunOptions(seed=seed)).run(last_goal=1)
     (leg,) = record.legs
     kind = leg.outcome.split(":")[0]

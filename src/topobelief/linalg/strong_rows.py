@@ -49,7 +49,7 @@ class StrongRows:
 
     @staticmethod
     def of(form: EdgeForm) -> StrongRows | None:
-        """Tell strong rows from the others; None where there are none, or so many that the others are the exception."""
+        """Find the strong rows; None where there are none, or so many that the others are the exception."""
         squares = np.maximum(form.rows_i**2, form.rows_j**2)  # (m, r, b)
         typical = np.median(squares.max(axis=1), axis=0)
         if not (typical > 0).all():
@@ -69,8 +69,8 @@ class StrongRows:
             magnitude_i=kept * form.magnitude_i,
             magnitude_j=kept * form.magnitude_j,
         )
-        lacks = np.sqrt(1 - factors[edge, row] ** 2)[:, None]
-        rows_i, rows_j = lacks * form.rows_i[edge, row], lacks * form.rows_j[edge, row]
+        rest = np.sqrt(1 - factors[edge, row] ** 2)[:, None]
+        rows_i, rows_j = rest * form.rows_i[edge, row], rest * form.rows_j[edge, row]
         share = (norms[edge, row] / np.linalg.norm(norms[edge], axis=1))[:, None]
         sizes_i, sizes_j = share * form.magnitude_i[edge], share * form.magnitude_j[edge]
         return StrongRows(weakened, edge, rows_i, rows_j, np.abs(rows_i) + sizes_i, np.abs(rows_j) + sizes_j)
