@@ -1,4 +1,4 @@
-"""A record made by hand, so that what is written and drawn of a run can be told without a run."""
+"""A record made by hand, so that what is written and drawn of a run can be tested without a run."""
 
 from __future__ import annotations
 

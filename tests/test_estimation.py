@@ -14,12 +14,12 @@ from scipy.optimize import least_squares
 
 from data_files import RECORDED, data_file
 from graphs import SE2_GROUP, SE3_GROUP, pose_graphs
+from topobelief.conversions.gtsam import from_gtsam, to_gtsam
 from topobelief.errors import DisconnectedGraphError, EstimationError
 from topobelief.estimation import _Problem, optimize
 from topobelief.geometry import Group
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.formats import read_pose_graph
-from topobelief.io.gtsam import from_gtsam, to_gtsam
 
 GROUPS = pytest.mark.parametrize("group", [SE2_GROUP, SE3_GROUP], ids=["SE(2)", "SE(3)"])
 

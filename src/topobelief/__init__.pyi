@@ -4,8 +4,12 @@ from .candidates.diverse_paths import diverse_paths as diverse_paths
 from .candidates.polyline import path_poses as path_poses
 from .candidates.predicted_factors import default_information as default_information
 from .candidates.predicted_factors import predict_actions as predict_actions
+from .candidates.propose import CandidateRule as CandidateRule
+from .candidates.propose import propose as propose
 from .candidates.roadmap import Roadmap as Roadmap
 from .candidates.roadmap import build_roadmap as build_roadmap
+from .conversions.gtsam import from_gtsam as from_gtsam
+from .conversions.gtsam import to_gtsam as to_gtsam
 from .entropy import joint_entropy as joint_entropy
 from .entropy import joint_entropy_estimate as joint_entropy_estimate
 from .errors import ReadingWarning as ReadingWarning
@@ -22,8 +26,6 @@ from .io.floor_plan import read_world as read_world
 from .io.formats import read_pose_graph as read_pose_graph
 from .io.g2o import read_g2o as read_g2o
 from .io.g2o import write_g2o as write_g2o
-from .io.gtsam import from_gtsam as from_gtsam
-from .io.gtsam import to_gtsam as to_gtsam
 from .io.reading import ReadingOptions as ReadingOptions
 from .io.ros_map import read_ros_map as read_ros_map
 from .io.ros_map import write_ros_map as write_ros_map

@@ -3,8 +3,8 @@
     J = (n - 1) kappa / 2 ln(2 pi e) - 1/2 ln det I        (Kitanov and Indelman, arXiv 1903.00927, eq. 14)
 
 I is the Fisher information at the poses as they stand, each measurement taken as the one that they predict, with one pose
-anchored (its block removed). ln det I is the same whatever pose is anchored; rounding is not, so the pose with the strongest
-information is held whichever is asked for (on a real graph with one information of 2.7e12 that saves two digits).
+anchored (its block removed). ln det I is the same whatever pose is anchored; its rounding error is not, so the pose with the
+strongest information is held whichever is asked for (on a real graph with one information of 2.7e12 that saves two digits).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def joint_entropy(graph: PoseGraph, *, anchor: int = 0) -> float:
     Returns
     -------
     float
-        Nats; the smaller, the better known. 0 for a single pose.
+        Nats; the smaller, the better the poses are known. 0 for a single pose.
 
     Raises
     ------

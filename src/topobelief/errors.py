@@ -1,4 +1,4 @@
-"""What can go wrong, one root: every error that topobelief raises on purpose is a `TopobeliefError`.
+"""The errors of the package: every error that topobelief raises on purpose is a `TopobeliefError`.
 
 A message says what was expected and what was found, names the place (file and line, edge, node, action),
 and then what to do. The values that it names are attributes too, so that a program need not parse text.
@@ -141,3 +141,9 @@ def require_choice(name: str, value: str, choices: Collection[str]) -> None:
     if value not in choices:
         listed = ", ".join(f'"{choice}"' for choice in choices)
         raise InvalidInputError(f"expected {name} to be one of {listed}, got {value!r}")
+
+
+def require_positive(name: str, value: float, *, unit: str = "") -> None:
+    """Raise `InvalidInputError` where `value` is not a finite number above 0."""
+    if not (math.isfinite(value) and value > 0):
+        raise InvalidInputError(f"expected {name} above 0{f' {unit}' if unit else ''}, got {value}")

@@ -4,15 +4,15 @@ Most public files hold dead reckoning, far from the minimum. The search therefor
 
 1. Rotations by chordal relaxation (Martinec and Pajdla, CVPR 2007; Carlone, Tron, Daniilidis and Dellaert, ICRA 2015):
    R_j = R_i R_ij is linear in the entries of the matrices, so one sparse solve gives them up to a projection to rotations.
-   Weights are those of the rotation once the position is given away, |O_r|p|^(1/q).
+   Weights are those of the rotation with the position marginalised, |O_r|p|^(1/q).
 2. Positions by linear least squares, exact for given rotations.
 3. Gauss-Newton on all poses, with exact Jacobians of the residual that `PoseGraph.chi2` squares. Its step is a direction of
    descent and is halved until chi^2 falls; after each, positions are solved for again (variable projection, Golub and
-   Pereyra 1973), so that turning a pose does not fight the distances that swing with it.
+   Pereyra 1973), so that a rotation is not held back by positions that would have to move with it.
 
 All of it rests on one sparse L D L^T, which takes any information. GTSAM's optimiser, which the tests compare with, refuses
 some of these graphs: its planar initialisation (LAGO) wants diagonal noise, which csail and intel do not have, and its default
-elimination calls intel indeterminate, for the sake of one edge with information 2.7e12; there it makes no step.
+elimination calls intel indeterminate because of one edge with information 2.7e12 and makes no step.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def optimize(graph: PoseGraph, *, max_iterations: int = 300) -> PoseGraph:
     graph.topology.require_connected(names=graph.ids)
     problem = _Problem(graph)
     found: PoseGraph | None = None
-    with suppress(EstimationError):  # the filed poses may still do
+    with suppress(EstimationError):  # the search may still succeed from the given poses
         found = graph.with_poses(problem.minimum_from(problem.chordal_start(), max_iterations))
     if found is not None and found.chi2 <= graph.chi2:
         return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Sequence
+from importlib.util import find_spec
 from typing import Any
 
 from topobelief.errors import InvalidInputError
@@ -30,6 +31,16 @@ def load(package: str, extra: str) -> Any:
         return importlib.import_module(package)
     except ModuleNotFoundError:
         raise missing_packages([package], [extra]) from None
+
+
+def is_installed(package: str) -> bool:
+    """Whether a package is installed; it is not loaded."""
+    return find_spec(package) is not None
+
+
+def has_kernels() -> bool:
+    """Whether numba is installed, which compiles the kernels of increments."""
+    return is_installed("numba")
 
 
 def missing_packages(packages: Sequence[str], extras: Sequence[str]) -> InvalidInputError:

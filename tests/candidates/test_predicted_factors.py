@@ -151,7 +151,7 @@ class TestStart:
 
     GRAPH = drive([(0, 0), (1, 0), (2, 0), (2, 4), (2, 5), (2, 6)])
 
-    def test_new_poses_hang_on_the_pose_that_is_chosen(self) -> None:
+    def test_new_poses_are_joined_to_the_pose_that_is_chosen(self) -> None:
         action = predict(self.GRAPH, [(2, 0), (2, -3)], start=2)
         assert action.edges.tolist() == [[2, 6], [6, 7], [7, 8]]
         np.testing.assert_allclose(action.poses[:, :2], [(2, -1), (2, -2), (2, -3)])

@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+import topobelief as tb
 from topobelief.candidates.diverse_paths import diverse_paths
 from topobelief.candidates.polyline import path_length
 from topobelief.candidates.predicted_factors import predict_actions
@@ -58,6 +59,11 @@ def test_every_number_of_the_rule_reaches_its_part(by_hand):
     assert same(found.actions, expected)
     assert found.lengths.tolist() == [path_length(path) for path in by_hand] == sorted(found.lengths)
     assert len(found.routes.roadmap.vertices) >= 120
+
+
+def test_the_rule_and_the_step_are_public():
+    assert tb.propose is propose
+    assert tb.CandidateRule is CandidateRule
 
 
 def test_the_two_halves_are_the_whole(by_hand):

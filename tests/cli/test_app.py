@@ -98,8 +98,8 @@ def test_the_options_offer_exactly_the_choices_of_the_library(offered, known):
 
 @pytest.mark.parametrize("command", ["plan", "info"])
 def test_help_names_all_that_can_be_dropped(topobelief, command):
-    told = topobelief([command, "--help"]).out
-    assert {word for word in get_args(io_reading.Droppable) if word not in told} == set()
+    output = topobelief([command, "--help"]).out
+    assert {word for word in get_args(io_reading.Droppable) if word not in output} == set()
 
 
 def test_a_terminal_without_greek_letters_is_no_bug(office):

@@ -48,7 +48,7 @@ def test_missing_packages_are_named_in_one_line(arguments, hidden, message, tmp_
 
 def test_nothing_is_said_where_all_is_there(monkeypatch):
     extras.require_extras("fast", "gtsam", "sim", "page")
-    monkeypatch.setattr(extras, "find_spec", lambda name: None)
+    monkeypatch.setattr(extras, "is_installed", lambda package: False)
     with pytest.raises(
         InvalidInputError, match=r"expected numba to be installed, got none; run pip install 'topobelief\[fast\]'"
     ):

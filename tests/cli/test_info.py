@@ -121,9 +121,9 @@ def test_a_disconnected_graph_is_described_by_its_components(topobelief, tmp_pat
         {"num_poses": 1, "num_edges": 0, "first": X5, "last": X5, "chi2_per_dof_filed": None},
     ]
     assert "joint_entropy" not in found
-    told = topobelief(["info", str(tmp_path / "parts.g2o"), "--drop", "priors"]).out
+    output = topobelief(["info", str(tmp_path / "parts.g2o"), "--drop", "priors"]).out
     for text in ("2 components", "3 poses, 1 … 3", "3 edges, χ² per degree of freedom 0.08333 as filed", "pose x5", "no edges"):
-        assert text in told
+        assert text in output
 
 
 def test_what_was_dropped_is_told(topobelief, tmp_path):
@@ -134,8 +134,8 @@ def test_what_was_dropped_is_told(topobelief, tmp_path):
     assert found["num_components"] == 1
     assert found["joint_entropy"] > 0
     assert len(found["notes"]) == 2
-    told = topobelief(["info", str(tmp_path / "parts.g2o"), *options]).out
-    assert told.splitlines()[:2] == found["notes"]
+    output = topobelief(["info", str(tmp_path / "parts.g2o"), *options]).out
+    assert output.splitlines()[:2] == found["notes"]
     assert found["notes"][0].endswith(
         "parts.g2o: dropped absolute priors on poses: EDGE_SE2_PRIOR on line 8; what they measure is not counted"
     )
@@ -144,8 +144,8 @@ def test_what_was_dropped_is_told(topobelief, tmp_path):
 def test_a_crowd_of_components_is_cut_short(topobelief, tmp_path):
     lines = [f"VERTEX_SE2 {k} {k} 0 0" for k in range(13)] + ["EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1"]
     (tmp_path / "crowd.g2o").write_text("\n".join(lines))
-    told = topobelief(["info", str(tmp_path / "crowd.g2o")]).out
-    assert "2 poses, 0 … 1" in told
-    assert "1 edge, a tree" in told
-    assert told.splitlines()[-1].split() == ["and", "smaller", "ones", "2"]
+    output = topobelief(["info", str(tmp_path / "crowd.g2o")]).out
+    assert "2 poses, 0 … 1" in output
+    assert "1 edge, a tree" in output
+    assert output.splitlines()[-1].split() == ["and", "smaller", "ones", "2"]
     assert len(facts(topobelief, tmp_path / "crowd.g2o")["components"]) == 12

@@ -374,14 +374,14 @@ def test_where_specks_part_some_paths_the_number_of_classes_is_a_lower_bound(top
 
 
 def test_the_graph_is_read_as_the_options_say(topobelief, office, tmp_path):
-    """A lone pose far away and a prior are left out, and told; the plan is that of the rest."""
+    """A lone pose far away and a prior are left out, and a note says so; the plan is that of the rest."""
     graph_file = tmp_path / "parts.g2o"
     graph_file.write_text(
         office.graph_file.read_text() + "VERTEX_SE2 999 50 50 0\nEDGE_SE2_PRIOR 0 0 0 0 1 0 0 1 0 1\n", encoding="utf-8"
     )
     arguments = office.plan("--candidates", 2, "--component", "largest", "--drop", "priors", "--no-exact")
     arguments[1] = str(graph_file)
-    told = topobelief(arguments).out.splitlines()
-    assert told[0].startswith(f"{graph_file}: dropped absolute priors on poses: EDGE_SE2_PRIOR on line ")
-    assert told[1] == f"{graph_file}: kept one of 2 components: 21 of 22 poses (0 … 20)"
-    assert told[2] == f"{graph_file}: 21 poses, 24 edges"
+    printed = topobelief(arguments).out.splitlines()
+    assert printed[0].startswith(f"{graph_file}: dropped absolute priors on poses: EDGE_SE2_PRIOR on line ")
+    assert printed[1] == f"{graph_file}: kept one of 2 components: 21 of 22 poses (0 … 20)"
+    assert printed[2] == f"{graph_file}: 21 poses, 24 edges"

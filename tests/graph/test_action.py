@@ -96,7 +96,7 @@ def test_staying_is_an_action_in_space_too():
         ([], [(0, 2)]),  # no new poses
     ],
 )
-def test_any_shape_of_action_is_welcome(poses, edges):
+def test_any_shape_of_action_is_accepted(poses, edges):
     action = Action(poses, edges, EYE)
     check_actions(PRIOR, [action])
     assert posterior(PRIOR, action).edges[2:].tolist() == [list(edge) for edge in edges]

@@ -17,7 +17,7 @@ FAR = PoseGraph(SQUARE * [1, 3, 1], LOOP, FITS.measurements, OMEGA)  # stretched
 TREE = PoseGraph(SQUARE, LOOP[:3], 3 * FITS.measurements[:3], OMEGA)
 
 
-def told(call, count: int) -> list[str]:
+def warnings_of(call, count: int) -> list[str]:
     """Messages of so many calls from one place, as Python shows them by default."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("default")
@@ -28,7 +28,7 @@ def told(call, count: int) -> list[str]:
 
 @pytest.mark.parametrize("call", [lambda: joint_entropy(FAR), lambda: Planner(FAR)], ids=["entropy", "planner"])
 def test_a_graph_far_from_its_estimate_warns_once(call):
-    (message,) = told(call, 3)
+    (message,) = warnings_of(call, 3)
     assert f"χ² per degree of freedom is about {FAR.chi2 / FAR.degrees_of_freedom:.0e}" in message
     assert "topobelief.optimize" in message
 
@@ -41,9 +41,9 @@ def test_the_warning_names_the_line_of_the_caller(call):
 
 
 def test_candidates_on_such_a_graph_do_not_each_warn():
-    """Closures change chi^2 per degree of freedom a little, and with it no digit that is told."""
+    """Closures change chi^2 per degree of freedom a little, and with it no digit of the message."""
     after = [posterior(FAR, Action([[0, y, 0]], [(3, 4), (4, 0)], OMEGA)) for y in (4, 5, 6)]
-    assert len(told(lambda: [joint_entropy(graph) for graph in after], 2)) == 1
+    assert len(warnings_of(lambda: [joint_entropy(graph) for graph in after], 2)) == 1
 
 
 @pytest.mark.parametrize(
@@ -58,4 +58,4 @@ def test_candidates_on_such_a_graph_do_not_each_warn():
 )
 def test_others_do_not(graph):
     assert misfit(graph) is None
-    assert told(lambda: (joint_entropy(graph), Planner(graph)), 1) == []
+    assert warnings_of(lambda: (joint_entropy(graph), Planner(graph)), 1) == []

@@ -53,7 +53,7 @@ def test_bad_matrices_are_refused_by_edge(information, message):
         checked_information(information, num_edges=4, tangent_dim=3)
 
 
-def test_badly_scaled_matrices_are_welcome():
+def test_badly_scaled_matrices_are_accepted():
     badly_scaled = np.diag([1e12, 1e-12, 1.0])
     assert np.array_equal(checked_information(badly_scaled, num_edges=2, tangent_dim=3), [badly_scaled, badly_scaled])
 

@@ -89,7 +89,7 @@ def test_the_sum_over_blocks_is_the_log_determinant(group, kind, num_poses, num_
 
 
 def test_rotations_are_no_sum_over_blocks():
-    """I_rr sees a motion of all poses together, so that it matters which one is held."""
+    """A motion of all poses together changes the form of I_rr, so that it matters which one is held."""
     rows = fisher_rows(PoseGraph([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [(0, 1), (1, 2)], None, np.eye(3)))
     assert not rows.rotations().gauge_free
     assert all(getattr(rows, name)().gauge_free for name in FORMS)

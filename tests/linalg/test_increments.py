@@ -130,7 +130,7 @@ def diagonal_log_det(graph, form, held, shift):
 
 
 @given(sessions())
-def test_a_forest_hangs_every_new_node_once_and_parents_come_first(session):
+def test_a_forest_attaches_every_new_node_once_and_parents_come_first(session):
     batch = ActionBatch(session.graph, session.actions)
     extensions, n = batch.extensions, session.graph.num_poses
     assert extensions.planted.sum() == batch.num_new.sum()

@@ -125,7 +125,7 @@ def test_an_action_beyond_double_precision_is_named_by_increments_too():
 
 
 def test_without_numba_everything_is_evaluated_from_scratch(monkeypatch):
-    monkeypatch.setattr(planner_module, "_has_kernels", lambda: False)
+    monkeypatch.setattr(planner_module, "has_kernels", lambda: False)
     graph, actions = session(5, num_actions=3)
     assert Planner(graph).decide(actions).num_actions == 3
     anchored = Planner(graph, bounds="anchored").decide(actions)

@@ -89,7 +89,7 @@ def test_bounds_bracket_each_objective_and_cost_adds_to_both(session, determinan
 
 @given(pose_graphs(), st.integers(1, 5), st.integers(0, 2**32 - 1))
 def test_the_map_gains_nothing_without_closures_but_costs_decide(graph, length, seed):
-    """Any tree hung anywhere leaves J_map as it is: zero gain, so the cheaper way wins."""
+    """Any tree, attached anywhere, leaves J_map as it is: the gain is zero, so the cheaper action is chosen."""
     rng = np.random.default_rng(seed)
     n = graph.num_poses
     poses = graph.poses[rng.integers(n, size=length)].copy()

@@ -162,10 +162,10 @@ def test_a_margin_asks_for_one_upper_bound(session, configuration, proof):
 def test_the_margin_counts_the_cost():
     planner = Planner(LINE)
     upper = planner.decide([explore]).upper[0]
-    dear = Action(explore.poses, explore.edges, OMEGA, cost=5.0)
+    costly = Action(explore.poses, explore.edges, OMEGA, cost=5.0)
     assert planner.decide([explore], margin=upper + 1).margin_met
-    assert not planner.decide([dear], margin=upper + 1).margin_met
-    assert planner.decide([dear], margin=upper + 5.1).margin_met
+    assert not planner.decide([costly], margin=upper + 1).margin_met
+    assert planner.decide([costly], margin=upper + 5.1).margin_met
 
 
 # The proof ---------------------------------------------------------------------------------------------------------------
@@ -284,16 +284,16 @@ def test_an_interruption_while_bounding_certifies_nothing_yet_but_rules_out_noth
     assert (decision.error_bound, decision.proven_optimal, decision.num_evaluations) == (math.inf, False, 0)
 
 
-def test_progress_is_told_by_stage():
-    told = []
+def test_progress_is_reported_by_stage():
+    reports = []
     planner = Planner(LINE, engine="scratch")
-    planner.decide([explore, revisit], proof="optimal", on_progress=lambda *news: told.append(news))
-    assert told[:2] == [("signatures", 1, 2), ("signatures", 2, 2)]
-    assert {stage for stage, _, _ in told} <= {"signatures", "bounds", "evaluations"}
-    assert all(1 <= done <= total for _, done, total in told)
-    told.clear()
-    planner.entropies([explore, revisit], on_progress=lambda *news: told.append(news))
-    assert told == [("evaluations", 1, 2), ("evaluations", 2, 2)]
+    planner.decide([explore, revisit], proof="optimal", on_progress=lambda *report: reports.append(report))
+    assert reports[:2] == [("signatures", 1, 2), ("signatures", 2, 2)]
+    assert {stage for stage, _, _ in reports} <= {"signatures", "bounds", "evaluations"}
+    assert all(1 <= done <= total for _, done, total in reports)
+    reports.clear()
+    planner.entropies([explore, revisit], on_progress=lambda *report: reports.append(report))
+    assert reports == [("evaluations", 1, 2), ("evaluations", 2, 2)]
 
 
 # Corner cases -------------------------------------------------------------------------------------------------------------
@@ -318,10 +318,10 @@ def test_identical_actions_tie_by_index_and_both_survive(signature):
 
 
 def test_of_identical_actions_the_cheaper_is_proven_best():
-    dear = Action(revisit.poses, revisit.edges, OMEGA, cost=0.5)
-    decision = Planner(LINE).decide([dear, revisit], proof="optimal")
+    costly = Action(revisit.poses, revisit.edges, OMEGA, cost=0.5)
+    decision = Planner(LINE).decide([costly, revisit], proof="optimal")
     assert decision.best == 1
-    assert decision.entropies[1] == pytest.approx(Planner(LINE).entropies([dear])[0])
+    assert decision.entropies[1] == pytest.approx(Planner(LINE).entropies([costly])[0])
 
 
 @pytest.mark.parametrize("engine", ["scratch", "incremental"])
@@ -332,12 +332,12 @@ def test_equal_actions_are_computed_once(engine, signature):
     other_noise = Action(revisit.poses, revisit.edges, [OMEGA, OMEGA, 0.999 * OMEGA])
     other_place = Action([[4, 0.99, 0]], revisit.edges, OMEGA)
     actions = [explore, revisit, named, other_noise, revisit, other_place]
-    planner, told = Planner(LINE, signature=signature, engine=engine), []
-    decision = planner.decide(actions, proof="optimal", on_progress=lambda *news: told.append(news))
-    assert ("signatures", 4, 4) in told
+    planner, reports = Planner(LINE, signature=signature, engine=engine), []
+    decision = planner.decide(actions, proof="optimal", on_progress=lambda *report: reports.append(report))
+    assert ("signatures", 4, 4) in reports
     assert (decision.best, decision.proven_optimal) == (1, True)
-    values = planner.entropies(actions, on_progress=lambda *news: told.append(news))
-    assert told[-1] == ("evaluations", 4, 4)
+    values = planner.entropies(actions, on_progress=lambda *report: reports.append(report))
+    assert reports[-1] == ("evaluations", 4, 4)
     np.testing.assert_allclose(values, [Planner(LINE).entropies([action])[0] for action in actions], rtol=1e-12)
     for name in ("signatures", "entropies"):
         assert len(set(getattr(decision, name)[[1, 2, 4]])) == 1
@@ -355,11 +355,11 @@ def test_a_margin_bounds_the_first_of_equal_actions_alone():
 
 
 def test_cost_is_left_out_of_entropies_and_kept_in_bounds():
-    dear = Action(revisit.poses, revisit.edges, OMEGA, cost=3.0)
+    costly = Action(revisit.poses, revisit.edges, OMEGA, cost=3.0)
     planner = Planner(LINE)
-    J = planner.entropies([dear])[0]
+    J = planner.entropies([costly])[0]
     assert abs(J - entropy_reference(posterior(LINE, revisit))) < 1e-9
-    decision = planner.decide([dear, Action(revisit.poses, revisit.edges, OMEGA, cost=3.1)], proof="optimal")
+    decision = planner.decide([costly, Action(revisit.poses, revisit.edges, OMEGA, cost=3.1)], proof="optimal")
     assert decision.entropies[0] == pytest.approx(J, abs=1e-12)
     assert decision.lower[0] <= J + 3.0 <= decision.upper[0]
     cheap, costly = (planner.decide([Action(revisit.poses, revisit.edges, OMEGA, cost=cost)]) for cost in (0.0, 3.0))
@@ -456,22 +456,22 @@ def test_a_planner_needs_a_connected_graph_and_an_anchor_in_it():
 
 
 def test_a_bad_action_is_named_before_any_work():
-    told = []
+    reports = []
     bad = Action([[5, 0, 0]], [(4, 5), (5, 9)], OMEGA, label="bad")
     with pytest.raises(InvalidActionError, match=r"action 2 \('bad'\), edge 1: expected indices below 6"):
-        Planner(LINE).decide([explore, revisit, bad], on_progress=lambda *news: told.append(news))
-    assert told == []
+        Planner(LINE).decide([explore, revisit, bad], on_progress=lambda *report: reports.append(report))
+    assert reports == []
 
 
 @pytest.mark.parametrize("factor", [2.0, 1 + 1e-3, 1 + 1e-7], ids=["twice", "a thousandth", "a ten-millionth"])
 def test_the_papers_bounds_name_the_action_whose_noise_differs(factor):
     other = Action([[5, 0, 0]], [(4, 5), (5, 0)], [OMEGA, factor * OMEGA], label="other")
-    told = []
+    reports = []
     with pytest.raises(
         InvalidActionError, match=r"action 1 \('other'\), edge 1: .*expect the graph's information.*bounds=\"fischer\""
     ) as info:
-        Planner(LINE, bounds="paper").decide([explore, other], on_progress=lambda *news: told.append(news))
-    assert (info.value.action, info.value.edge, told) == (1, 1, [])
+        Planner(LINE, bounds="paper").decide([explore, other], on_progress=lambda *report: reports.append(report))
+    assert (info.value.action, info.value.edge, reports) == (1, 1, [])
 
 
 def test_the_papers_bounds_name_the_action_even_where_the_graph_has_no_edge_yet():
@@ -487,7 +487,7 @@ def test_the_papers_bounds_refuse_a_graph_of_mixed_noise_when_the_planner_is_mad
         Planner(mixed, bounds="paper")
 
 
-def test_a_dense_spectrum_above_3000_poses_is_asked_for_twice():
+def test_a_dense_spectrum_above_3000_poses_must_be_allowed():
     n = 3001
     large = PoseGraph(np.column_stack([np.arange(n), np.zeros((n, 2))]), path(n).edges, None, OMEGA)
     with pytest.raises(

@@ -74,11 +74,11 @@ def test_5000_decisions_in_8_threads(bounds, engine, count):
     assert found == [expected[which] for which in order]
 
 
-def test_a_planner_may_be_asked_while_it_tells_of_progress():
+def test_a_planner_may_be_used_while_it_reports_progress():
     graph, actions = session(3)
     planner = Planner(graph)
     expected = planner.decide(actions, proof="optimal").to_dict()
-    told = []
-    found = planner.decide(actions, proof="optimal", on_progress=lambda *_: told.append(planner.decide(actions[:1]).best))
+    choices = []
+    found = planner.decide(actions, proof="optimal", on_progress=lambda *_: choices.append(planner.decide(actions[:1]).best))
     assert found.to_dict() == expected
-    assert set(told) == {0}
+    assert set(choices) == {0}

@@ -64,7 +64,7 @@ def test_injected_noise_shows_what_it_was_added_to():
     assert "odometry of the graph alone" in texts(draw_run(made_record(noise=InjectedNoise.of_ratio(0.85))))
 
 
-def test_a_goal_not_reached_is_told_apart():
+def test_a_goal_not_reached_is_marked():
     words = texts(draw_run(made_record(outcome="stuck: no progress")))
     assert "goal, not reached" in words
     assert "1 of 2 goals" in words

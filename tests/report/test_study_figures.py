@@ -1,4 +1,4 @@
-"""Figures of a study show what its summary says, whatever it lacks."""
+"""Figures of a study show what its summary says, also where values are missing."""
 
 from __future__ import annotations
 

@@ -165,7 +165,7 @@ def test_a_damaged_laser_does_not_stop_the_robot(house, lidar):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_how_a_blind_robot_ends_is_told_truly(house, seed):
+def test_the_end_of_a_blind_robot_is_reported_truly(house, seed):
     record = Episode(replace(house, lidar=LidarSettings(nan_share=1.0)), RunOptions(seed=seed)).run(last_goal=1)
     (leg,) = record.legs
     kind = leg.outcome.split(":")[0]
@@ -191,7 +191,7 @@ def test_a_contact_ends_the_leg_and_the_run_with_its_reason(house):
 
 @pytest.mark.parametrize(("name", "seed"), [("depot", 7108), ("tb3_sandbox", 7105)])
 def test_a_robot_among_table_legs_and_pillars_arrives_where_it_believes_to_be(name, seed):
-    """It once caught on a leg, let its wheels spin, and was told to have arrived, 7.6 and 0.7 m from the goal."""
+    """It once caught on a leg, let its wheels spin, and was reported as arrived, 7.6 and 0.7 m from the goal."""
     record = Episode(scenario_of(str(case_file(f"scenarios/{name}.yaml"))), RunOptions(seed=seed)).run()
     assert [leg.outcome for leg in record.legs] == [ARRIVED, ARRIVED]
     for leg in record.legs:

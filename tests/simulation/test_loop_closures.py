@@ -83,7 +83,7 @@ def test_right_closures_are_believed_and_displaced_ones_are_not() -> None:
     assert len(pairs) > 0.95 * (sum(len(range(j % 24, j - 5, 24)) for j in range(1, len(truth))) - len(false))
 
 
-def test_a_first_closure_waits_for_company_and_then_both_are_believed() -> None:
+def test_a_first_closure_is_held_back_until_another_agrees_and_then_both_are_believed() -> None:
     truth, rng = laps(2), np.random.default_rng(2)
     rule = consistency()
     for j in range(1, 25):

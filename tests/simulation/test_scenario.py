@@ -16,7 +16,7 @@ from topobelief.world import World
 
 
 @pytest.mark.parametrize("name", SCENARIO_NAMES)
-def test_all_places_of_a_scenario_hang_together(name):
+def test_all_places_of_a_scenario_are_connected(name):
     scenario = named_scenario(name)
     radius = scenario.rule.robot_radius
     reached = Polygon(scenario.world.component(scenario.start[:2], radius))

@@ -68,6 +68,6 @@ def test_encoder_noise_does_not_add_up() -> None:
     assert np.std(off[1000:]) == pytest.approx(0.01, rel=0.1)
 
 
-def test_a_robot_at_rest_slips_not() -> None:
+def test_a_robot_at_rest_does_not_slip() -> None:
     encoders = WheelEncoders(slip=0.1, noise=0.0, wheel_radius=0.1, rng=np.random.default_rng(0))
     assert [encoders.read(np.zeros(2)).tolist() for _ in range(3)] == [[0, 0]] * 3

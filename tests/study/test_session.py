@@ -63,7 +63,7 @@ def test_bounds_hold_where_a_strategy_has_them(rows):
     assert seen == 2 * 2 * 2 * 5
 
 
-def test_shortest_and_random_look_away(rows):
+def test_shortest_and_random_ignore_the_graph(rows):
     for (_, _, strategy, _), row in rows.items():
         if strategy == "shortest":
             assert row["length"] == min(row["candidate_lengths"])

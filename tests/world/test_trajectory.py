@@ -51,6 +51,20 @@ def test_a_pose_without_odometry_stands_in_a_disc_of_its_own() -> None:
     assert world.clearance([(0, 0)])[0] == pytest.approx(2.0, rel=0.01)
 
 
+def test_a_jump_between_consecutive_poses_that_no_edge_joins_opens_no_corridor() -> None:
+    """Two drives side by side, joined by a closure between their first poses; pose 2 ends the one, pose 3 begins the other."""
+    poses = [[0, 0, 0], [5, 0, 0], [10, 0, 0], [0, 20, 0], [5, 20, 0], [10, 20, 0]]
+    graph = PoseGraph(poses, [(0, 1), (1, 2), (3, 4), (4, 5), (0, 3)], None, np.eye(3))
+    world = World.from_trajectory(graph, width=1.0)
+    assert not world.contains([(5, 10), (0, 10)]).any()
+    assert world.visible([(0, 0), (0, 20)], [(10, 0), (10, 20)]).all()
+
+
+def test_a_graph_without_odometry_is_a_disc_at_each_pose() -> None:
+    graph = PoseGraph([[0, 0, 0], [10, 0, 0], [20, 0, 0], [30, 0, 0]], [(0, 2), (2, 0), (1, 3), (0, 3)], None, np.eye(3))
+    assert len(World.from_trajectory(graph, width=2.0).free.geoms) == 4
+
+
 def test_the_default_width_is_two_typical_steps_though_most_steps_turn_on_the_spot() -> None:
     positions = [(float(i // 10), 0.0) for i in range(100)]
     assert default_width(drive(positions)) == pytest.approx(2.0)

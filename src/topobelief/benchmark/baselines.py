@@ -17,10 +17,10 @@ import qdldl
 from scipy import linalg
 
 from topobelief.arrays import FloatArray, IntArray
+from topobelief.conversions.gtsam import load_gtsam, to_gtsam
 from topobelief.graph.action import Action, posterior
 from topobelief.graph.fisher import fisher_rows
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.io.gtsam import load_gtsam, to_gtsam
 from topobelief.linalg.block_pattern import BlockPattern
 from topobelief.linalg.edge_form import EdgeForm, laplacian_form
 from topobelief.signatures.von_neumann import von_neumann_entropy, von_neumann_entropy_approx

@@ -1,4 +1,4 @@
-"""Bounds of ln det I, and so of the entropy: a family a file, each written in terms of forms."""
+"""Bounds of ln det I, and so of the entropy: one file per family, each written in terms of forms."""
 
 from topobelief.bounds.entropy_bounds import Bounds, entropy_bounds
 

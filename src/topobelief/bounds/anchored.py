@@ -1,15 +1,15 @@
 """Bounds of ln det I anchored in the prior, whose log-determinant is known: the increment alone is bounded.
 
-With I_b the prior extended by the trees of edges on which an action's new poses hang, exact, and R = U H I_b^-1 H^T U^T of its
-closures, whose whitened rows U H have positions first (docs, the mathematics, section 8),
+With I_b the prior extended by the trees of edges by which an action's new poses are attached, exact, and R = U H I_b^-1 H^T U^T
+of its closures, whose whitened rows U H have positions first (docs, the mathematics, section 8),
 
     ln det I_b + ln det (I + R_pp|r) + ln det (I + R_rr)  <=  ln det I  <=  ln det I_b + ln det (I + R_pp) + ln det (I + R_rr).
 
-I + R is the covariance of what the closures will see. Right: Fischer's inequality. Left: its Schur complement, what is left to
-see of the positions when the rotation rows are known, is at least what is left when all rotations are known; then the position
-rows are those of I_pp, whose own increment by the closures is ln det (I + R_pp|r). Where nothing is closed, all three meet.
+I + R is the covariance of what the closures will measure. Right: Fischer's inequality. Left: its Schur complement, the
+covariance of the position rows given the rotation rows, is at least their covariance given all rotations; then the position
+rows are those of I_pp, whose own increment by the closures is ln det (I + R_pp|r). Without closures all three are equal.
 
-From scratch the exact value costs less than these bounds: both are it.
+From scratch the exact value costs less than these bounds, so that both are the exact value.
 """
 
 from __future__ import annotations

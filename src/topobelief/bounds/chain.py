@@ -5,8 +5,8 @@ window of m closures (docs, the mathematics, section 8),
 
     ln det S  =  sum over l of ln det cov(z_l | z_1 … z_(l-1))  <=  sum over l of ln det cov(z_l | z_(l-m) … z_(l-1)),
 
-because conditioning on less leaves more covariance. Exact for m >= c. Only blocks of I_b^-1 between closures of one window are
-needed; the lower bound is that of `anchored`, which needs the rotations of all.
+because a covariance given fewer closures is at least as large. Exact for m >= c. Only blocks of I_b^-1 between closures of one
+window are needed; the lower bound is that of `anchored`, which needs the rotations of all.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Lower and upper bounds of the joint entropy of one graph, a family at a choice."""
+"""Lower and upper bounds of the joint entropy of one graph, by a family of choice."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def entropy_bounds(
         At the poses where the information is wanted: optimise it first (`topobelief.optimize`).
     family
         "fischer": any noise, never looser than the paper's with the same anchor. "fischer_step": never looser than Fischer's,
-        some times as expensive. "paper": Kitanov and Indelman's, one block-isotropic Omega on all edges.
+        several times as expensive. "paper": Kitanov and Indelman's, one block-isotropic Omega on all edges.
     determinant
         "cholesky": exact determinant in the lower bound. "hadamard": product of its diagonal, cheaper and looser.
     anchor

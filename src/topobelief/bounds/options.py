@@ -1,4 +1,4 @@
-"""What a family of bounds can be told."""
+"""Options of the families of bounds."""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
 Among obstacles a shortest path consists of straight ways that touch the outline of what the robot's centre can reach
 where they end (Lozano-Pérez and Wesley, "An algorithm for planning collision-free paths among polyhedral obstacles",
 CACM 1979). Around a corner of an obstacle this outline is an arc; the places here are corners of a polygon around it.
-Only those ways between two places are worth a test that pass the outline on one side at both ends.
+A straight line between two places is tested only if the outline lies on one side of it at both ends.
 """
 
 from __future__ import annotations

@@ -47,7 +47,7 @@ class Rays:
         max_rays: int | None = None,
         specks: bool = False,
     ) -> Rays:
-        """Rays of the obstacles that are worth telling apart.
+        """Rays of the obstacles whose two sides are worth distinguishing.
 
         Of the holes in the region that the robot's centre can reach (see `World.component`), those that measure at
         least `min_size` (corner to corner of their extent, metres) and that a path from start to goal of at most

@@ -46,7 +46,7 @@ def path_length(path: ArrayLike) -> float:
 
 
 def stations(path: FloatArray, distances: FloatArray) -> Stations:
-    """Where a path is after each distance, and which way it heads there: at a corner, the way that led to it.
+    """Where a path is after each distance, and in which direction it heads there: at a corner, the direction of arrival.
 
     Parameters
     ----------

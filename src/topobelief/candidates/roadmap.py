@@ -28,7 +28,7 @@ from shapely import Polygon
 from topobelief.arrays import BoolArray, FloatArray, IntArray, frozen_floats
 from topobelief.candidates.corners import Corners, find_corners, tangents
 from topobelief.candidates.passages import find_passages
-from topobelief.errors import InvalidInputError, InvalidMapError, PlanningError
+from topobelief.errors import InvalidInputError, InvalidMapError, PlanningError, require_positive
 from topobelief.world import World, shapes
 
 _dijkstra = cast("Any", dijkstra)  # whose stub refuses one index
@@ -235,8 +235,7 @@ def checked_ends(world: World, start: ArrayLike, goal: ArrayLike, robot_radius: 
     PlanningError
         Where one of them is out of bounds or in collision, or both are the same place.
     """
-    if not (np.isfinite(robot_radius) and robot_radius > 0):
-        raise InvalidInputError(f"expected a robot radius above 0 m, got {robot_radius}")
+    require_positive("a robot radius", robot_radius, unit="m")
     ends = np.stack([_checked_place(start, "start"), _checked_place(goal, "goal")])
     for name, place, clearance in zip(("start", "goal"), ends, world.clearance(ends).tolist(), strict=True):
         x_min, y_min, x_max, y_max = world.bounds

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
-
-from topobelief.optional import missing_packages
+from topobelief.optional import is_installed, missing_packages
 
 _PACKAGES = {
     "fast": ("numba",),
@@ -23,6 +21,6 @@ def require_extras(*extras: str) -> None:
     InvalidInputError
         Names the packages that are missing and what to install.
     """
-    absent = [package for extra in extras for package in _PACKAGES[extra] if find_spec(package) is None]
+    absent = [package for extra in extras for package in _PACKAGES[extra] if not is_installed(package)]
     if absent:
         raise missing_packages(absent, extras)

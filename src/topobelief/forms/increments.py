@@ -17,7 +17,7 @@ from topobelief.graph.topology import Topology
 from topobelief.linalg.estimate import Estimate
 from topobelief.linalg.increments import Increments, Wanted, diagonal_increments, log_det_increments
 
-_LARGEST_ERROR = 1.0  # nats; a factor that knows less is none
+_LARGEST_ERROR = 1.0  # nats; a factor with a larger error is not used
 _QR_SIZE = 1200  # up to here an evaluation from scratch may do better, by QR, than a factor
 _QR_ERROR = 1e-3  # nats; only beyond it is that worth its time
 

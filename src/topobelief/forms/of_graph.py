@@ -1,4 +1,4 @@
-"""The forms after one action, from scratch: the reference for everything faster."""
+"""The forms after one action, from scratch: the reference for the faster engine."""
 
 from __future__ import annotations
 

@@ -19,9 +19,9 @@ from topobelief.linalg import EdgeForm, Estimate, LogDetSolver, laplacian_form
 from topobelief.linalg.elimination_paths import FormFactor, KnownColumns, changed_nodes
 from topobelief.linalg.elimination_tree import EliminationTree
 
-_HOLD_STRONGEST_ERROR = 1e-6  # nats; below it one more factorisation would not be seen
+_HOLD_STRONGEST_ERROR = 1e-6  # nats; below it one more factorisation would make no visible difference
 _STRONG_ROWS_ERROR = 1e-4  # nats; beyond it one more factorisation with strong rows last is worth its time
-_APPENDED_SHARE = 0.2  # of the longest path: poses that may follow an old order before a new one pays
+_APPENDED_SHARE = 0.2  # of the longest elimination path: poses appended to an old order beyond which a new order pays
 
 
 class PriorFactors:

@@ -94,7 +94,7 @@ class TreeForms(ABC, Generic[Number]):
 
 
 class ClosureForms(ABC, Generic[Number]):
-    """What loop closures add to the prior extended by the trees of edges on which the new poses hang, form "joint" I_b.
+    """What loop closures add to the prior extended by the trees of edges that attach the new poses, form "joint" I_b.
 
     z_l are the whitened residuals of the l-th closure, l in the order of the path, and S = I + R their predicted covariance.
     """

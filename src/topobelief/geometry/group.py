@@ -62,7 +62,7 @@ class Group(ABC):
 
     @abstractmethod
     def lever(self, offset: FloatArray) -> FloatArray:
-        """C(d) with `C(d) phi = -(phi x d)`: how turning the origin moves what is seen at `d`.
+        """C(d) with `C(d) phi = -(phi x d)`: how a rotation phi at the origin changes the relative position of a point at `d`.
 
         Parameters
         ----------

@@ -29,14 +29,15 @@ class Action(ReadOnlyArrays):
         Where the new poses will be, world frame.
     edges : shape (c, 2)
         Odometry included. Indices of the graph, then num_poses, num_poses + 1, … for the new poses, in any order
-        and direction; parallel edges and edges among new poses are welcome. No edges at all ("stay") is valid with L = 0.
+        and direction; parallel edges and edges among new poses are allowed. No edges at all ("stay") is valid with L = 0.
     information : shape (c, kappa, kappa) or (kappa, kappa)
     label
         What a person calls the action.
     cost
         A deterministic cost (length, energy, time), in nats; it adds to the entropy and to its bounds.
     length
-        How far the robot drives, metres; it is told and has no influence. Default: from pose to pose (`driven_lengths`).
+        How far the robot drives, metres; it is reported and does not influence decisions. Default: from pose to pose
+        (`driven_lengths`).
 
     Raises
     ------
@@ -104,12 +105,12 @@ class Action(ReadOnlyArrays):
 
     @property
     def num_closures(self) -> int:
-        """Edges beyond the one that each new pose needs to hang on the graph."""
+        """Edges beyond the one that attaches each new pose to the graph."""
         return len(self.edges) - self.num_new_poses
 
 
 def check_action(graph: PoseGraph, action: Action, *, index: int | None = None) -> None:
-    """Check what only the graph can tell: dimensions, index range, self-loops, and that every new pose is attached.
+    """Check what depends on the graph: dimensions, index range, self-loops, and that every new pose is attached.
 
     Raises
     ------
@@ -180,7 +181,7 @@ def check_actions(graph: PoseGraph, actions: Sequence[Action]) -> None:
 
 
 def _all_fit(graph: PoseGraph, actions: Sequence[Action]) -> bool:
-    """Whether `check_action` finds nothing wrong, told at once for all."""
+    """Whether `check_action` finds nothing wrong, for all actions at once."""
     sizes, columns = (0, graph.tangent_dim), graph.poses.shape[1]
     if not all(
         action.information.shape[-1] in sizes and (len(action.poses) == 0 or action.poses.shape[1] == columns)
@@ -211,7 +212,7 @@ def _length_from_pose_to_pose(graph: PoseGraph, action: Action) -> float:
     if action.num_new_poses == 0:
         return 0.0
     low, high = np.sort(action.edges, axis=1).T
-    start = low[(low < graph.num_poses) & (high == graph.num_poses)][:1]  # empty where only later poses hang on the graph
+    start = low[(low < graph.num_poses) & (high == graph.num_poses)][:1]  # empty where only later poses are joined to the graph
     path = np.concatenate([graph.positions[start], graph.group.position(action.poses)])
     return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
 

@@ -1,9 +1,10 @@
-"""Whether a graph stands near the maximum-likelihood estimate, without which entropies and bounds describe no map.
+"""Whether a graph stands near the maximum-likelihood estimate, away from which entropies and bounds do not describe the map.
 
 chi^2 per degree of freedom is near 1 at the estimate if the information matrices are calibrated. At 100 the root mean square of
 the residuals is ten standard deviations: an estimate fits so badly only where noise is claimed ten times too small or closures
 are false. Of nine public files, seven that hold dead reckoning have 119 to 20 000 as filed and at most 1 once optimised. One
-whose noise is claimed far too large has 11 as filed: such graphs are not noticed, because optimised ones may have as much.
+whose noise is claimed far too large has 11 as filed: no warning is given for such graphs, because optimised ones may have as
+much.
 """
 
 from __future__ import annotations
@@ -27,6 +28,6 @@ def misfit(graph: PoseGraph) -> str | None:
 
 
 def warn_of_misfit(graph: PoseGraph) -> None:
-    """Warn the caller's caller of a graph that is far from its estimate; Python tells each place of it once."""
+    """Warn the caller's caller of a graph that is far from its estimate; Python shows it once for each place."""
     if message := misfit(graph):
         warnings.warn(f"{message} (topobelief.optimize)", NotOptimizedWarning, stacklevel=3)

@@ -2,7 +2,7 @@
 
 Notation (docs, the mathematics, sections 3 to 5): Omega = [[O_pp, O_pr], [O_rp, O_rr]] on the tangent
 (translation, rotation); k and q the dimensions of positions and rotations;
-O_r|p = O_rr - O_rp O_pp^-1 O_pr the rotation's information once the position is given away.
+O_r|p = O_rr - O_rp O_pp^-1 O_pr the rotation's information with the position marginalised.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Pose graphs: poses, relative pose measurements between them, and their information.
 
-The conventions are stated once, here: poses are `T_world_body`; a measurement on the edge (i, j) is `T_i_j`, made in
+Conventions: poses are `T_world_body`; a measurement on the edge (i, j) is `T_i_j`, made in
 the frame of i; its information matrix lives in the tangent at the measured pose, ordered (translation, rotation),
 as g2o and GTSAM store it.
 """
@@ -31,8 +31,8 @@ class PoseGraph(ReadOnlyArrays):
     poses : shape (n, 3) or (n, 7)
         [x, y, theta] or [x, y, z, qx, qy, qz, qw]; metres, radians. Quaternions are normalised.
     edges : shape (m, 2)
-        Indices of poses. The measurement is made in the frame of `edges[:, 0]`. Parallel edges are measurements
-        in their own right; self-loops are rejected.
+        Indices of poses. The measurement is made in the frame of `edges[:, 0]`. Each of several parallel edges is a measurement
+        of its own; self-loops are rejected.
     measurements : shape (m, 3) or (m, 7), or None
         T_i_j. None: what the poses predict.
     information : shape (m, kappa, kappa) or (kappa, kappa)

@@ -1,1 +1,1 @@
-"""Files in and out: pose graphs (g2o, TORO), floor plans, and the conversion to GTSAM; a format a file."""
+"""Files in and out: pose graphs (g2o, TORO) and floor plans, one file per format."""

@@ -1,4 +1,4 @@
-"""Text files in, whole files out.
+"""Text files are read as a whole, and files are written completely or not at all.
 
 Reading turns everything that can be wrong with a path into one `FileError`. Writing goes to a temporary file beside the
 target, which takes the target's name only when it is complete: an interrupted program leaves the old file or none.

@@ -1,6 +1,6 @@
 """Floor plans in files: walls as boxes in CSV, and any kind of map by its suffix.
 
-A CSV plan has the header `x_min,y_min,x_max,y_max`, then one wall a line, in metres. A line that begins with # is a
+A CSV plan has the header `x_min,y_min,x_max,y_max`, then one wall per line, in metres. A line that begins with # is a
 comment; one of the form `# bounds: x_min y_min x_max y_max` says what the plan shows and where its fence stands. Without
 it the plan ends where its walls end.
 """

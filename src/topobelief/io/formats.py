@@ -13,7 +13,7 @@ from topobelief.io.toro import TORO
 
 
 def read_pose_graph(path: StrPath, **options: Unpack[ReadingKeywords]) -> PoseGraph:
-    """Read a pose graph in g2o or TORO format; the first line of a graph tells which, the name of the file does not matter.
+    """Read a pose graph in g2o or TORO format; the first line of a graph shows which; the name of the file does not matter.
 
     Parameters
     ----------

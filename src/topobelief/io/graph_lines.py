@@ -55,7 +55,7 @@ def read_lines(path: StrPath, dialects: Sequence[Dialect], options: ReadingOptio
     FileError
         Names the file, the line, what was expected and what is there.
     DisconnectedGraphError
-        If poses without a vertex line hang on none that has one; names some of them.
+        If poses without a vertex line are connected to none that has one; names some of them.
     """
     return _Reader(path, dialects, options).read()
 

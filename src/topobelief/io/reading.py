@@ -77,7 +77,7 @@ class ReadGraph(NamedTuple):
     notes: tuple[str, ...]
 
     def warned(self) -> PoseGraph:
-        """The graph, each note issued as a `ReadingWarning` to whoever called the reader."""
+        """The graph, each note issued as a `ReadingWarning` to the caller of the reader."""
         for note in self.notes:
             warnings.warn(note, ReadingWarning, stacklevel=3)
         return self.graph

@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from PIL import Image, ImageFile, UnidentifiedImageError
 
 from topobelief.arrays import BoolArray, FloatArray
-from topobelief.errors import FileError, InvalidInputError, InvalidMapError, MapWarning
+from topobelief.errors import FileError, InvalidInputError, InvalidMapError, MapWarning, require_positive
 from topobelief.io.files import StrPath, atomic_file
 from topobelief.io.yaml_fields import Field, read_fields
 from topobelief.world import World
@@ -41,7 +41,7 @@ _DAMAGE = (ArithmeticError, EOFError, LookupError, NotImplementedError, SyntaxEr
 _MAX_PIXELS = 150_000_000  # some 1.2 GB and 8 s
 _SMALLEST_RESOLUTION, _LARGEST_RESOLUTION = 1e-6, 1e6  # metres a pixel
 _COARSE = 2.0  # metres a pixel, above which millimetres are more likely
-_MAX_CELLS_AWAY = 1e9  # from the origin of the world, at which coordinates still tell a millionth of a cell
+_MAX_CELLS_AWAY = 1e9  # from the origin of the world, at which coordinates still resolve a millionth of a cell
 
 
 def read_ros_map(path: StrPath, *, unknown: Unknown = "occupied") -> World:
@@ -103,8 +103,7 @@ def write_ros_map(
     cells = np.asarray(occupancy)
     if cells.ndim != 2 or cells.size == 0 or not np.isin(cells, (-1, 0, 100)).all():
         raise InvalidInputError(f"expected cells of -1, 0 and 100, shape (rows, columns), got {cells.dtype} of {cells.shape}")
-    if not (math.isfinite(resolution) and resolution > 0):
-        raise InvalidInputError(f"expected a resolution above 0 m, got {resolution}")
+    require_positive("a resolution", resolution, unit="m")
     if len(origin) != 3 or not all(map(math.isfinite, origin)):
         raise InvalidInputError(f"expected a finite origin (x, y, yaw), got {origin}")
     if Path(path).suffix.lower() not in (".yaml", ".yml"):

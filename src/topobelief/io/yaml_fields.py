@@ -1,4 +1,4 @@
-"""YAML whose values know their place, so that an error names the file, the line and the field."""
+"""YAML values together with their place in the file, so that an error names the file, the line and the field."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The only door to sparse factorisation: log-determinants of quadratic forms on graphs, with error estimates."""
+"""Everything that factors sparse matrices: log-determinants of quadratic forms on graphs, with error estimates."""
 
 from topobelief.linalg.edge_form import EdgeForm, laplacian_form
 from topobelief.linalg.estimate import Estimate

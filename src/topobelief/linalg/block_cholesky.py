@@ -1,12 +1,13 @@
 """Kernels: Cholesky factor of a sparse matrix of b x b blocks, solutions with it, and columns of its inverse.
 
-M = l l^T on an elimination tree: column t of l has blocks at the rows struct(t), all of them ancestors of t. Columns of l^-1
-live on the way from t to the root, and they follow from those of the ancestors,
+M = l l^T on an elimination tree: column t of l has blocks at the rows struct(t), all of them ancestors of t. The columns of
+l^-1 that belong to t are nonzero only on the elimination path of t, from t to the root, and follow from those of its ancestors,
 
     Y_t l_tt + sum over i in struct(t) of Y_i l_it = E_t,        Y_t = l^-1 E_t,
 
-so all of them cost |struct(t)| vector operations each, root first, and what is needed at t stands on the stack of a
-depth-first walk. Y_t is stored as b rows, each from the root down: the path of i is where the path of t begins.
+so that each of them costs |struct(t)| vector operations. The tree is walked depth-first from the root, and the columns needed
+at t are those on the stack of the walk. Y_t is stored as b rows, each from the root down: for an ancestor i, the path of i is
+the beginning of the path of t. ("Path" is short for elimination path in these kernels.)
 
 Notation: `start`, `rows` compressed columns of l below its diagonal, rows ascending; `axes` a tuple of length b.
 """
@@ -161,7 +162,8 @@ def factorize(
 ) -> bool:
     """Replace the blocks of M by those of l, column by column, left-looking; False where a pivot is not positive.
 
-    Columns that follow each other with the same rows (a supernode) wait together for the row at which they are needed next.
+    Columns that follow each other with the same rows (a supernode) are kept together in the list of the row at which they are
+    needed next.
     Columns that are done hold l already.
     """
     b, n = len(axes), len(diagonal)
@@ -208,7 +210,7 @@ def finish_column(
     diagonal: FloatArray,
     blocks: FloatArray,
 ) -> bool:
-    """Add to a column of M what earlier columns take away, by row in `work`, and divide by the root of its pivot."""
+    """Add the updates from earlier columns, by row in `work`, to a column of M, and divide it by the root of its pivot."""
     b = len(axes)
     for c in range(b):
         for d in range(b):

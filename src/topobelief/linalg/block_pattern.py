@@ -1,6 +1,6 @@
 """Sparsity patterns of block matrices on graphs, built once and filled many times.
 
-The upper triangle of a block matrix with one block a node and one a pair of adjacent nodes, in compressed columns,
+The upper triangle of a block matrix with one block per node and one per pair of adjacent nodes, in compressed columns,
 with the held (anchored) nodes left out. Parallel edges add into one block.
 """
 

@@ -2,7 +2,7 @@
 
 Blocks of I + R are needed between closures of one window, and those of the other rows (not the first ones of each closure)
 between all. The other rows of a form's closures touch the other variables of a node alone: in the joint information matrix,
-rotations see rotations.
+rotation rows touch rotations only.
 """
 
 from __future__ import annotations
@@ -16,15 +16,7 @@ from topobelief.linalg.compiled import compiled
 from topobelief.linalg.dense_kernels import cholesky_log_det, gram_block, inverse_diagonal
 from topobelief.linalg.elimination_paths import Paths
 from topobelief.linalg.extensions import Extensions
-from topobelief.linalg.forest_kernels import (
-    Blocks,
-    compress_forest,
-    eliminate_forest,
-    expand_blocks,
-    new_blocks,
-    new_forest,
-    reduce_closures,
-)
+from topobelief.linalg.forest_kernels import Blocks, reduce_extension
 from topobelief.linalg.increment_kernels import site_gaps, touched_sites
 
 
@@ -49,19 +41,11 @@ def add_chained_increments(
     window
         Closures before each one on which it is conditioned.
     """
-    b = rows_i.shape[2]
     for k in which:
-        num_edges = int(extensions.edge_start[k + 1] - extensions.edge_start[k])
-        num_new = int(extensions.node_start[k + 1] - extensions.node_start[k])
-        forest = new_forest(num_new, b, 0.0)
-        blocks = new_blocks(num_edges - num_new, b)
-        count = reduce_closures(extensions, k, rows_i, rows_j, forest, blocks)
-        out[k, 0], out[k, 6], count = eliminate_forest(extensions, k, rows_i, rows_j, forest, blocks, count)
+        out[k, 0], out[k, 6], blocks, rows, widths = reduce_extension(extensions, k, rows_i, rows_j, 0.0)
+        count = len(widths)
         if count == 0:
             continue
-        columns = compress_forest(extensions, k, forest, blocks, count)
-        rows, widths = np.zeros((count * b, columns * b)), np.zeros(count, np.int64)
-        expand_blocks(extensions, k, forest, blocks, count, rows, widths)
         sites = touched_sites(blocks, count, path_of)
         gap = site_gaps(sites, paths)
         out[k, 4] = cholesky_log_det(_covariance_of_other_rows(blocks, count, rows, widths, split, sites, gap, paths))
@@ -83,7 +67,7 @@ def _add_chain(
     sizes: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Conditional covariances along the path into out[5], what their error is proportional to into out[6]."""
+    """Add ln det of the conditional covariances to out[5], and what their error is proportional to to out[6]."""
     b, count = blocks.rows.shape[2], len(order)
     band = np.zeros((count, window + 1, b, b))  # blocks of I + R between each closure and those before it
     gram = np.empty((b, b))

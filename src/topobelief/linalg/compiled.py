@@ -1,7 +1,7 @@
 """Compiled kernels: numba with a disk cache, without the interpreter's lock, spread over the cores by a thread pool.
 
 Kernels are compiled when they are first called and kept beside the package (or in numba's cache folder where that is not
-writable), so only the first call after installing waits. They call no BLAS: its threads would fight with these.
+writable), so only the first call after installing waits. They call no BLAS: its threads would compete with these.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def num_threads() -> int:
 
 
 def in_parallel(work: Callable[[int, int], Any], bounds: Sequence[int]) -> None:
-    """Call `work(start, stop)` for each pair of consecutive bounds, a thread a core; the first error is raised."""
+    """Call `work(start, stop)` for each pair of consecutive bounds, with one thread per core; the first error is raised."""
     parts = [(start, stop) for start, stop in itertools.pairwise(bounds) if stop > start]
     if len(parts) <= 1 or num_threads() == 1:
         for start, stop in parts:

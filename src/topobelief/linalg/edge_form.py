@@ -3,7 +3,7 @@
 Every matrix whose determinant this package takes is M = sum over edges e = (i, j) of R_e^T R_e, where the rows
 R_e = [R_i R_j] touch the variables of two nodes only: a weighted Laplacian (one row, -sqrt(w) and sqrt(w)), the Fisher
 information (kappa rows), and its position and rotation parts. Rows, not blocks, are what is stored: a Gram matrix loses
-half of the digits, so whoever needs them all (QR, increments) can start from the rows.
+half of the digits, so computations that need all of them (QR, increments) start from the rows.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ class EdgeForm:
     multiplicity
         The matrix meant is M kron I_multiplicity.
     gauge_free
-        Whether the rows do not see a motion of all nodes together. Then it does not matter for ln det which one node is held,
-        and ln det is a sum over blocks (docs, the mathematics, section 4).
+        Whether a motion of all nodes together leaves the rows' values as they are. Then it does not matter for ln det which one
+        node is held, and ln det is a sum over blocks (docs, the mathematics, section 4).
     """
 
     edges: IntArray

@@ -1,8 +1,9 @@
-"""Forms factored once and asked often: log-determinant, and entries of the inverse between a few nodes.
+"""Forms that are factored once and used often: log-determinant, and entries of the inverse between a few nodes.
 
 A form's matrix M = l l^T is factored in b x b blocks along an elimination tree. (M^-1)_st = Y_s^T Y_t with Y_t = l^-1 E_t,
-which lives on the way from t to the root of the tree. Stored root first, two paths have in common what lies above their
-nodes' lowest common ancestor, so that an entry of the inverse is one contiguous dot product.
+which is nonzero only on the elimination path of t (its *path*, for short), from t to the root of the tree. Stored root first,
+two paths have in common what lies above their nodes' lowest common ancestor, so that an entry of the inverse is one contiguous
+dot product.
 
 The error estimate of ln det M is that of `log_det`, taken node by node. What is computed from paths belongs to the same
 perturbed matrix M + E as ln det M, and forming the columns of l^-1 perturbs l once more, by no more than the factorisation
@@ -125,9 +126,9 @@ class FormFactor:
     def with_strong_rows_last(
         edges: IntArray, num_nodes: int, held: int, form: EdgeForm, *, shift: float = 0.0
     ) -> FormFactor | None:
-        """The factor where a few rows are so much stronger than the others that rounding them would drown these.
+        """The factor where a few rows are so much stronger than the others that their rounding errors would exceed these.
 
-        The nodes of the strong rows come last. M_0, in which these rows are weakened, is factored; then what they lack is
+        The nodes of the strong rows come last. M_0, in which these rows are scaled down, is factored; then the difference is
         added to the dense part of the factor by orthogonal triangles. None where no rows are that strong, or too many.
 
         Parameters
@@ -151,7 +152,7 @@ class FormFactor:
         return self.diagonal.shape[1]
 
     def _with_more_rows(self, strong: StrongRows) -> FormFactor:
-        """This factor with the strong rows' lacks added to the last nodes, whose part is dense."""
+        """This factor with the rest of the strong rows added to the last nodes, whose part is dense."""
         tree, b = self.tree, self.block_size
         num_last = int(np.count_nonzero(tree.position[np.unique(tree.edges[strong.edge])] >= 0))
         first = tree.num_free - num_last
@@ -239,7 +240,7 @@ class FormFactor:
 
 
 def _on_last_nodes(tree: EliminationTree, strong: StrongRows, first: int) -> tuple[FloatArray, FloatArray]:
-    """What strong rows lack, and the sizes of the terms behind that, on the variables of the places from `first` on."""
+    """The rest of the strong rows, and the sizes of the terms behind that, on the variables of the places from `first` on."""
     places = tree.position[tree.edges[strong.edge]] - first
     b = strong.rows_i.shape[1]
     rows, sizes = np.zeros((2, len(places), tree.num_free - first, b))

@@ -36,7 +36,8 @@ class EliminationTree:
     parent, depth : shape (n,)
         Place of the parent, -1 at a root; number of ancestors.
     num_appended
-        Nodes that came last, after the rest was ordered to keep the factor sparse: all paths may be longer by so many.
+        Nodes that came last, after the rest was ordered to keep the factor sparse: all elimination paths may be longer by so
+        many.
     """
 
     edges: IntArray
@@ -99,8 +100,8 @@ class EliminationTree:
     def adapted(self, edges: IntArray, num_nodes: int, held: int) -> EliminationTree:
         """The tree of a grown graph, in which old nodes keep their order.
 
-        New nodes that see no old one come first: they leave the rest of the factor as it is. The others come last, behind the
-        node that was held.
+        New nodes without an edge to an old one come first: they leave the rest of the factor as it is. The others come last,
+        behind the node that was held.
 
         Parameters
         ----------
@@ -131,7 +132,7 @@ class EliminationTree:
 
     @property
     def longest_path(self) -> int:
-        """Nodes on the way from the deepest node to its root."""
+        """Nodes on the longest elimination path."""
         return int(self.depth.max(initial=-1)) + 1
 
     @property
@@ -251,7 +252,7 @@ def _postorder(parent: IntArray) -> IntArray:
     """An order in which every subtree is contiguous and children stand before their parents; the identity if that is one."""
     n = len(parent)
     child, sibling = unset(n + 1), unset(n + 1)
-    for j in range(n - 1, -1, -1):  # children in ascending order; roots hang on node n
+    for j in range(n - 1, -1, -1):  # children in ascending order; roots are children of node n
         above = parent[j] if parent[j] >= 0 else n
         sibling[j], child[above] = child[above], j
     order, stack = np.empty(n, np.int64), np.empty(n + 1, np.int64)

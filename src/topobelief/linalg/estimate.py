@@ -1,4 +1,4 @@
-"""Numbers that know their rounding error: one, or one for each of K actions."""
+"""Numbers with estimates of their rounding errors: one number, or one for each of K actions."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Estimate(Generic[Number]):
     Attributes
     ----------
     value, error : float, or shape (K,)
-        nan and inf where rounding leaves nothing.
+        nan and inf where rounding leaves no digit.
     """
 
     value: Number
@@ -52,7 +52,7 @@ class Estimate(Generic[Number]):
         return Estimate(value, self.error + UNIT_ROUNDOFF * (abs(constant) + abs(self.value) + abs(value)))
 
     def known(self, what: str) -> Estimate[Number]:
-        """Itself, if its error is small enough to mean anything; of K values, those that are not become nan.
+        """Itself, if its error is small enough; of K values, those with larger errors become nan.
 
         Raises
         ------

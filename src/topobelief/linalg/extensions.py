@@ -1,7 +1,7 @@
 """Extensions of a graph: new nodes and edges, many candidates for the same graph one after the other.
 
-The new nodes of each are hung on the graph by a spanning forest of the edges; the other edges are its closures. Chains and
-branches hung anywhere, closures among new nodes, between existing ones, stored either way and parallel are all the same.
+The new nodes of each are attached to the graph by a spanning forest of its edges; the other edges are its closures. Chains and
+branches may be attached anywhere; closures may join new nodes, existing ones or both, in either direction, and be parallel.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ class Extensions(NamedTuple):
     edge_start, node_start : shape (K + 1,)
         Where each extension begins, among edges and new nodes.
     stem : shape (number of new nodes,)
-        Edge by which each new node hangs.
+        Edge of the forest that leads to each new node, away from the graph.
     order : shape (number of new nodes,)
-        New nodes of each extension, a node before those that hang on it.
+        New nodes of each extension, a node before those that it leads to.
     planted : shape (number of edges,)
-        Whether an edge is a stem.
+        Whether an edge belongs to the forest.
     """
 
     num_existing: int
@@ -64,7 +64,7 @@ class Extensions(NamedTuple):
 
 @compiled
 def _root(group: IntArray, node: int) -> int:
-    """The node that stands for a node's group; ways there are halved."""
+    """The node that represents a node's group (union-find with path halving)."""
     while group[node] != node:
         above = int(group[node])
         group[node] = group[above]
@@ -103,7 +103,7 @@ def _plant_forests(
                 slot = e - edge_start[k]
                 link[slot, 0], link[slot, 1] = head[i], head[j]
                 head[i], head[j] = 2 * slot, 2 * slot + 1
-        placed = 0  # those reached already are a queue
+        placed = 0  # the nodes reached so far form a queue
         for reached in range(num_new + 1):
             half = head[0 if reached == 0 else order[first_new + reached - 1] - first_new + 1]
             while half >= 0:

@@ -1,8 +1,8 @@
 """Kernels that reduce one extension of a graph to what couples it to the graph: rows on unit noise and on existing nodes.
 
 Everything works on rows, by Householder reflections, so that no digits are lost to differences: closures become square; the
-forest of new nodes is eliminated from its leaves to where it hangs; its nodes without closures are skipped; each closure is
-written as rows on the independent unit noise of the nodes that are left and on existing nodes.
+forest of new nodes is eliminated from its leaves to the nodes that it is attached to; its nodes without closures are skipped;
+each closure is written as rows on the independent unit noise of the nodes that are left and on existing nodes.
 
 Notation: b variables a node, r >= b rows an edge; an eliminated node is x = F x_parent + N noise. `new` counts an extension's
 new nodes from 0. A block is b rows on one or two nodes.
@@ -111,7 +111,7 @@ def leave_rest(
 def reduce_closures(
     extensions: Extensions, k: int, rows_i: FloatArray, rows_j: FloatArray, forest: Forest, blocks: Blocks
 ) -> int:
-    """Closures as blocks; what is more than b rows stands on one end alone, a new one if there is one. Returns their number."""
+    """Closures as blocks; rows beyond b touch one end alone, a new one if there is one. Returns their number."""
     r, b = rows_i.shape[1], rows_i.shape[2]
     n, first_new = extensions.num_existing, extensions.node_start[k]
     work, count = np.empty((r, 2 * b)), 0
@@ -152,7 +152,7 @@ def eliminate_forest(
         new = extensions.order[v] - first_new
         e = extensions.stem[extensions.order[v]]
         outward = extensions.edges[e, 1] == n + extensions.order[v]
-        parent = extensions.edges[e, 0 if outward else 1]
+        parent = int(extensions.edges[e, 0 if outward else 1])
         copy_block(rows_j[e] if outward else rows_i[e], work, 0, 0)
         copy_block(rows_i[e] if outward else rows_j[e], work, 0, b)
         num_rows = r
@@ -267,3 +267,31 @@ def expand_blocks(
                 for d in range(b):
                     blocks.rows[q, 0, c, d] += blocks.rows[q, 1, c, d]
             blocks.ends[q, 1] = -1
+
+
+@compiled
+def reduce_extension(
+    extensions: Extensions, k: int, rows_i: FloatArray, rows_j: FloatArray, shift: float
+) -> tuple[float, float, Blocks, FloatArray, IntArray]:
+    """The steps above for one extension, in their order.
+
+    Returns
+    -------
+    log_det, condition
+        As `eliminate_forest` returns them.
+    blocks
+        On existing nodes alone. There is room for more than are used: their number is the length of `widths`.
+    rows, widths
+        As `expand_blocks` writes them.
+    """
+    r, b = rows_i.shape[1], rows_i.shape[2]
+    num_edges = int(extensions.edge_start[k + 1] - extensions.edge_start[k])
+    num_new = int(extensions.node_start[k + 1] - extensions.node_start[k])
+    forest = new_forest(num_new, b, shift)
+    blocks = new_blocks(2 * num_edges if r > b or shift > 0 else num_edges - num_new, b)
+    count = reduce_closures(extensions, k, rows_i, rows_j, forest, blocks)
+    log_det, condition, count = eliminate_forest(extensions, k, rows_i, rows_j, forest, blocks, count)
+    columns = compress_forest(extensions, k, forest, blocks, count) if count > 0 else 0
+    rows, widths = np.zeros((count * b, columns * b)), np.zeros(count, np.int64)
+    expand_blocks(extensions, k, forest, blocks, count, rows, widths)
+    return log_det, condition, blocks, rows, widths

@@ -11,15 +11,7 @@ from topobelief.linalg.compiled import compiled, unset
 from topobelief.linalg.dense_kernels import cholesky_log_det, gram_block, inverse_diagonal, periodic_part
 from topobelief.linalg.elimination_paths import Paths
 from topobelief.linalg.extensions import Extensions
-from topobelief.linalg.forest_kernels import (
-    Blocks,
-    compress_forest,
-    eliminate_forest,
-    expand_blocks,
-    new_blocks,
-    new_forest,
-    reduce_closures,
-)
+from topobelief.linalg.forest_kernels import Blocks, reduce_extension
 
 
 @compiled
@@ -53,19 +45,12 @@ def add_increments(
         each block alone; with the others alone; by the chain rule (`chain_kernels`); what their error is proportional to. Zero
         on entry.
     """
-    r, b = rows_i.shape[1], rows_i.shape[2]
+    b = rows_i.shape[2]
     for k in which:
-        num_edges = int(extensions.edge_start[k + 1] - extensions.edge_start[k])
-        num_new = int(extensions.node_start[k + 1] - extensions.node_start[k])
-        forest = new_forest(num_new, b, shift)
-        blocks = new_blocks(2 * num_edges if r > b or shift > 0 else num_edges - num_new, b)
-        count = reduce_closures(extensions, k, rows_i, rows_j, forest, blocks)
-        out[k, 0], out[k, 6], count = eliminate_forest(extensions, k, rows_i, rows_j, forest, blocks, count)
+        out[k, 0], out[k, 6], blocks, rows, widths = reduce_extension(extensions, k, rows_i, rows_j, shift)
+        count = len(widths)
         if count == 0:
             continue
-        columns = compress_forest(extensions, k, forest, blocks, count)
-        rows, widths = np.zeros((count * b, columns * b)), np.zeros(count, np.int64)
-        expand_blocks(extensions, k, forest, blocks, count, rows, widths)
         matrix = np.empty((count * b, count * b))  # I + V V^T
         for p in range(count * b):
             row = rows[p]

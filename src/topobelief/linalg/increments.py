@@ -8,7 +8,7 @@ T is the block of the new nodes with the forest's edges alone and the existing n
 independent unit noise of the forest's nodes, and on existing nodes, to which the forest leads them back. Both terms are
 increments, never differences of two large numbers; entries of M^-1 come from paths in the elimination tree. With the existing
 nodes held, ln det T + ln det (I + V V^T) is left, the block of the new nodes. Edges with more rows than variables are brought
-to square rows; what is left over stands on a new node alone where there is one, and costs nothing.
+to square rows; the rows left over touch one end alone, a new node where there is one.
 
 Errors, beyond those of M (see `elimination_paths`), in units of roundoff times the roundings behind a number: R is off by E
 with |E_pq| <= sqrt(S_p S_q), S the diagonal that R would have if no terms cancelled, and ln det (I + R) by tr((I + R)^-1 E),

@@ -9,10 +9,10 @@ u sqrt(B_i B_j), B the magnitude of the terms added. |(M^-1)_ij| <= v_i v_j with
 sampled on large ones (M^-1 R^T z has covariance M^-1 for random signs z). Where roundings repeat themselves, as on graphs
 whose edges are all equal, they add up instead of averaging out; the sums of M_ii v_i^2 and B_i v_i^2 stand for that.
 
-Where the estimate is too large, what can be had without a factor is taken apart first, and the smallest estimate wins: the
-graph falls into its blocks, bridges among them, if the form allows it (`blocks`); rows that are far stronger than the others
-are added afterwards (`strong_rows`); and Householder QR of the rows themselves, which does not square the condition number,
-serves what is small enough for a dense matrix.
+Where the estimate is too large, other ways are tried, and the result with the smallest estimate is taken: the graph is cut into
+its blocks, bridges among them, if the form allows it (`blocks`); rows that are far stronger than the others are added
+afterwards (`strong_rows`); and where the matrix is small enough to be dense, Householder QR of the rows is used, which does not
+square the condition number.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _EXACT_VARIANCE_SIZE = 200  # up to here the variances of the error estimate are
 _NUM_PROBES = 8
 _PROBE_SAFETY = 2.0  # eight probes underestimate one variance by more than this in few cases, a sum of them in fewer
 _CONFIDENCE = 4.0  # standard deviations of the rounding error that the estimate covers
-_SMALL_ERROR = 1e-6  # nats; below it one more factorisation would not be seen
+_SMALL_ERROR = 1e-6  # nats; below it one more factorisation would make no visible difference
 _WHOLE_SHARE = 0.9  # of the edges: a block with more is as good as the graph
 _LARGE_ERROR = 1e-4  # nats; beyond it solutions for strong rows are worth their time, and a QR that takes seconds
 _SMALL_RELATIVE_ERROR = 1e-8  # beyond it a QR that takes milliseconds is worth its time
@@ -106,7 +106,7 @@ class LogDetSolver:
         errors = UNIT_ROUNDOFF * (ASSEMBLY_OPERATIONS * form.block_size * condition + np.abs(values))
         known = np.isfinite(values) & np.isfinite(errors)
         values, errors = np.where(known, values, np.nan), np.where(known, errors, np.inf)
-        root_error = 0.0  # rows know nothing of it
+        root_error = 0.0  # 0 unless some block is taken from the rows
         for node in np.flatnonzero(errors > _SMALL_NODE_ERROR).tolist():
             better = _by_qr(*pattern.rows_at(form, node), shift)
             if better.error < errors[node]:

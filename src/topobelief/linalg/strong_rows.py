@@ -1,7 +1,7 @@
 """Strong rows apart: what a few rows that are far stronger than the others do to a matrix, and how to avoid it.
 
-A row whose square is 1e12 among others of 1 leaves them four digits in the Gram matrix M. So strong rows are weakened to the
-strength of the others before M is formed, and what they lack is added afterwards (docs, the mathematics, section 10):
+Where one row has the square 1e12 and the others 1, the Gram matrix M keeps four digits of the others. So strong rows are scaled
+down to the strength of the others before M is formed, and the rest is added afterwards (docs, the mathematics, section 10):
 
     M = M_0 + A^T A,        M_0 with f r in place of each strong row r,        A the rows sqrt(1 - f^2) r,
 
@@ -26,7 +26,7 @@ _MAX_STRONG_ROWS = 200  # each costs a solution with the factor
 
 @dataclass(frozen=True, slots=True)
 class StrongRows:
-    """A form whose strong rows are weakened, and what these lack.
+    """A form whose strong rows are scaled down, and the rest of these rows.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class StrongRows:
 
     @staticmethod
     def of(form: EdgeForm) -> StrongRows | None:
-        """Tell strong rows from the others; None where there are none, or so many that the others are the exception."""
+        """Find the strong rows; None where there are none, or so many that the others are the exception."""
         squares = np.maximum(form.rows_i**2, form.rows_j**2)  # (m, r, b)
         typical = np.median(squares.max(axis=1), axis=0)
         if not (typical > 0).all():
@@ -69,8 +69,8 @@ class StrongRows:
             magnitude_i=kept * form.magnitude_i,
             magnitude_j=kept * form.magnitude_j,
         )
-        lacks = np.sqrt(1 - factors[edge, row] ** 2)[:, None]
-        rows_i, rows_j = lacks * form.rows_i[edge, row], lacks * form.rows_j[edge, row]
+        rest = np.sqrt(1 - factors[edge, row] ** 2)[:, None]
+        rows_i, rows_j = rest * form.rows_i[edge, row], rest * form.rows_j[edge, row]
         share = (norms[edge, row] / np.linalg.norm(norms[edge], axis=1))[:, None]
         sizes_i, sizes_j = share * form.magnitude_i[edge], share * form.magnitude_j[edge]
         return StrongRows(weakened, edge, rows_i, rows_j, np.abs(rows_i) + sizes_i, np.abs(rows_j) + sizes_j)

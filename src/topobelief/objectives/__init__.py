@@ -1,1 +1,1 @@
-"""What is minimised, an objective a file, each written in terms of forms."""
+"""What is minimised, one file per objective, each written in terms of forms."""

@@ -14,7 +14,7 @@ Family = Callable[[Forms[Number], BoundOptions], tuple[Estimate[Number], Estimat
 
 
 class Objective(ABC):
-    """A number that an action makes large or small; the smaller, the better.
+    """A quantity that the best action makes smallest.
 
     Entropies are decreasing functions of ln det I with the rest exact, so bounds of ln det I bound them.
     """

@@ -26,7 +26,7 @@ _may_overflow = np.errstate(over="ignore", divide="ignore", invalid="ignore")  #
 
 @dataclass(frozen=True, slots=True)
 class Criteria:
-    """By what actions are judged, by name (see `registry`); parameters as for `topobelief.Planner`."""
+    """The criteria by which actions are judged, by name (see `registry`); parameters as for `topobelief.Planner`."""
 
     objective: str = "joint"
     signature: str = "spanning_trees"
@@ -89,7 +89,7 @@ class Batch:
         Parameters
         ----------
         which
-            Places of the actions that are wanted; the work for others is spared. Default: all.
+            Places of the actions that are wanted; nothing is computed for the others. Default: all.
 
         Raises
         ------

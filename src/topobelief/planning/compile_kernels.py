@@ -1,12 +1,11 @@
 """Compile every kernel before the first decision needs it: `python -m topobelief.planning.compile_kernels`.
 
-Kernels are compiled for the types of argument that they meet, once a machine, and kept on disk (see `linalg.compiled`). A tiny
-decision of each kind meets them all; it takes half a minute, or an instant if it has been done before.
+Kernels are compiled for the types of argument that they meet, once per machine, and kept on disk (see `linalg.compiled`). A
+tiny decision of each kind uses all of them; it takes half a minute, or an instant if it has been done before.
 """
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ import numpy as np
 from topobelief.geometry import SE2_GROUP, SE3_GROUP, Group
 from topobelief.graph.action import Action, posterior
 from topobelief.graph.pose_graph import PoseGraph
+from topobelief.optional import has_kernels
 from topobelief.planning.planner import Planner
 
 _CHOICES: tuple[dict[str, Any], ...] = (
@@ -39,7 +39,7 @@ def compile_kernels() -> None:
 
 def load_kernels() -> None:
     """The same where numba is installed; nothing otherwise. So the first decision by increments is as fast as the others."""
-    if find_spec("numba") is not None:
+    if has_kernels():
         compile_kernels()
 
 

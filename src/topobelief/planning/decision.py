@@ -118,10 +118,10 @@ class Decision(ReadOnlyArrays):
                 f"{ruled_out} {'was' if ruled_out == 1 else 'were'} ruled out by bounds."
             )
         elif self.proven_optimal and total > 1:
-            count, spared = self.num_evaluations, int(np.isnan(self.entropies).sum())
-            spared = f"; bounds ruled out the other {spared}" if count and spared else ""
+            count, skipped = self.num_evaluations, int(np.isnan(self.entropies).sum())
+            skipped = f"; bounds ruled out the other {skipped}" if count and skipped else ""
             evaluated = f"{count} exact evaluation{'s' if count > 1 else ''}" if count else "bounds alone"
-            sentences.append(f"That is proven by {evaluated}{spared}.")
+            sentences.append(f"That is proven by {evaluated}{skipped}.")
         return " ".join(sentences)
 
     def _claim(self) -> str:

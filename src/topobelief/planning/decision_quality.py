@@ -5,8 +5,8 @@ Notation: U* the action of least entropy, U^ the one of largest signature.
     epsilon = |J(U*) - J(U^)|
     gamma   = min over monotone f with f(s(U^)) = J(U^) of max over U of |J(U) - f(s(U))|
 
-f decreases in s. Fitting it is minimax isotonic regression with one point pinned, which has a closed form: half of the worst
-order violation between two actions, or the whole of it where the pinned action takes part.
+f decreases in s. Fitting it is minimax isotonic regression with f prescribed at one point, which has a closed form: half of the
+worst violation of the order between two actions, or the whole of it where the chosen action is one of them.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def decision_quality(entropies: ArrayLike, signatures: ArrayLike) -> DecisionQua
     scaled, exponent = _moderate(J)
     chosen = int(np.argmax(s))
     error = float(scaled[chosen] - scaled.min())
-    gamma = max(_worst_violation(scaled, s) / 2, _pinned_violation(scaled, s, chosen))
+    gamma = max(_worst_violation(scaled, s) / 2, _violation_of_chosen(scaled, s, chosen))
     tolerance = _RELATIVE_TOLERANCE * float(np.abs(scaled).max())
     with np.errstate(over="ignore"):
         error_nats, gamma_nats = np.ldexp([error, gamma], exponent).tolist()
@@ -107,7 +107,7 @@ def _worst_violation(J: FloatArray, s: FloatArray) -> float:
     return float(np.max(running[last_of_ties] - J[order]))
 
 
-def _pinned_violation(J: FloatArray, s: FloatArray, chosen: int) -> float:
+def _violation_of_chosen(J: FloatArray, s: FloatArray, chosen: int) -> float:
     """max of J(U^) - J, and of |J(U^) - J| where s ties with the chosen: f cannot meet these half-way."""
     below = float(np.max(J[chosen] - J))
     return max(below, float(np.max(np.abs(J - J[chosen])[s == s[chosen]])))

@@ -5,7 +5,7 @@ Notation: s signature, U^ = argmax s, LB and UB the bounds of the objective J pl
     margin given:      U^ alone if UB(U^) < margin, else all actions in ranking order
     margin not given:  Delta J_max = max(0, UB(U^) - min of LB over the others),   A = {U : LB(U) <= UB(U^)} and U^
 
-The paper has < in A; where bounds meet, a strict test would lose the winner. The theorem holds for any U^, so for one chosen
+The paper has < in A; where bounds meet, a strict test would drop U^ itself. The theorem holds for any U^, so for one chosen
 by a von Neumann signature too. The proof evaluates J along the ranking and skips what its lower bound rules out.
 """
 
@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from importlib.util import find_spec
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -28,7 +27,7 @@ from topobelief.graph.fit import warn_of_misfit
 from topobelief.graph.information import SAME_NOISE, shared_information
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.graph.topology import checked_anchor
-from topobelief.optional import missing_packages
+from topobelief.optional import has_kernels, missing_packages
 from topobelief.planning.batch import Batch, Criteria
 from topobelief.planning.decision import Decision
 from topobelief.planning.engine import Engine
@@ -46,7 +45,7 @@ Proof = Literal["none", "bounded", "optimal"]
 class Planner:
     """Chooses among actions on one pose graph.
 
-    Threads may share a planner. In pickles and copies it is one that has factored nothing yet.
+    Threads may share a planner. A pickled or copied planner has factored nothing yet.
 
     Parameters
     ----------
@@ -81,7 +80,7 @@ class Planner:
     Raises
     ------
     InvalidInputError
-        For an unknown choice, or a dense spectrum that was not asked for twice.
+        For an unknown choice, or a dense spectrum above 3000 poses without `allow_dense_spectrum`.
     DisconnectedGraphError
         Names the poses that the anchor does not reach.
 
@@ -118,7 +117,7 @@ class Planner:
         require_choice("signature", signature, SIGNATURES)
         require_choice("bounds", bounds, (*BOUNDS, AUTO))
         require_choice("engine", engine, (*ENGINES, AUTO))
-        if engine == "incremental" and not _has_kernels():
+        if engine == "incremental" and not has_kernels():
             raise missing_packages(["numba"], ["fast"])
         self._criteria = Criteria(objective, signature, bounds, BoundOptions(determinant, window), normalized)
         self._given_anchor, self._given_engine = anchor, engine
@@ -209,9 +208,9 @@ class Planner:
             "none": signatures only. "bounded": bounds of all actions. "optimal": exact evaluations along the ranking until
             no bound is below the best value found.
         max_evaluations
-            Stop the proof after this many exact evaluations, with the certificate reached.
+            Maximum number of exact evaluations; the decision then has the certificate reached so far.
         deadline
-            Seconds from now, checked between actions. A ranking always comes back; bounds and evaluations may be missing.
+            Seconds from now, checked between actions. A ranking is always returned; bounds and evaluations may be missing.
         on_progress
             Called after each action of each stage.
 
@@ -277,7 +276,7 @@ class Planner:
         if name == AUTO:
             large = num_actions * self._graph.num_edges >= _INCREMENTAL_WORK
             worthwhile = large or self._criteria.bounds in ("anchored", "chain")
-            name = "incremental" if worthwhile and _has_kernels() else "scratch"
+            name = "incremental" if worthwhile and has_kernels() else "scratch"
         if name not in self._engines:
             self._engines[name] = chosen(ENGINES, name)(self._graph, self._anchor)
         return self._engines[name]
@@ -322,11 +321,6 @@ def _cheapest_bounds(engine: Engine, criteria: Criteria, actions: Sequence[Actio
     costs = np.array([action.cost for action in sample])
     num_open = np.count_nonzero(lower + costs <= (upper + costs).min()) - 1  # without the best
     return "fischer" if num_open <= _OPEN_SHARE * (len(sample) - 1) else "chain"
-
-
-def _has_kernels() -> bool:
-    """Whether what increments are compiled with is installed."""
-    return find_spec("numba") is not None
 
 
 def _check_limits(margin: float | None, proof: str, max_evaluations: int | None, deadline: float | None) -> None:

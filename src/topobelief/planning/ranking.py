@@ -1,23 +1,23 @@
 """The order of actions by signature, and which of them are the same.
 
-A score is rounded to `_DIGITS` binary digits of the larger of the signature, the cost and 1. Actions go by their rounded
-scores, largest first, and by index where these are equal.
+A score is rounded to `_DIGITS` binary digits of the larger of the signature, the cost and 1. Actions are ordered by rounded
+score, largest first, and by index where these are equal.
 
 *The order of two actions depends on these two alone*, since it compares two numbers, each of which is a function of one
 action and its index. So another action, however badly scaled, never reorders them.
 
-*Two scores that differ by more than the last digit kept* of either are in their own order: rounding moves each of them by at
+*Two scores that differ by more than the last digit kept* of either keep their order: rounding moves each of them by at
 most half of its last digit.
 
-*Why not ties of all scores that differ by less than their errors?* Because that is no order. Take the scores 0, 0.9 and 1.8
-with errors of 0.5, listed so: by index the first precedes the second and the second the third, but by score the third
-precedes the first. Whatever breaks the circle looks at a third action to order two of them. Nor would it be of use: the
-estimate of an error says how far off a score may be, not that two scores are equal. Where it cannot tell two apart, the order
-of the computed scores is no worse a guess than that of the indices, and a better one where the estimate is too large or where
-two errors are mostly the same, as those that stem from the prior are. Certificates need neither: theorem and proof hold along
-any order.
+*Why are scores that differ by less than their errors not all ties?* Because that would be no order. Take the scores 0, 0.9 and
+1.8 with errors of 0.5, listed so: by index the first precedes the second and the second the third, but by score the third
+precedes the first. Any rule that breaks this circle would have to look at a third action to order two. Nor would such ties be
+of use: the estimate of an error says how far off a score may be, not that two scores are equal. Where it cannot tell two apart,
+the order of the computed scores is no worse a guess than that of the indices, and a better one where the estimate is too large
+or where two errors are mostly the same, as those that stem from the prior are. Certificates need neither: theorem and proof
+hold along any order.
 
-*How many digits?* So many that the last one matters to nobody (4e-6 nats in a score of ten thousand), and so few that scores
+*How many digits?* So many that the last one does not matter (4e-6 nats in a score of ten thousand), and so few that scores
 which are equal but were computed differently are hardly ever separated: on well-conditioned graphs rounding is thousands of
 times smaller.
 """

@@ -25,14 +25,14 @@ count once."""
 
 
 class Clock:
-    """A deadline, and whom to tell of progress.
+    """A deadline, and a callback for progress.
 
     Parameters
     ----------
     deadline
         Seconds from now; None for no deadline.
     on_progress
-        Told after each action.
+        Called after each action.
     """
 
     def __init__(self, deadline: float | None, on_progress: Progress | None) -> None:
@@ -50,7 +50,7 @@ class Clock:
         return time.monotonic() >= self._end
 
     def report(self, stage: str, done: int, total: int) -> None:
-        """Tell of progress."""
+        """Report progress."""
         if self._on_progress is not None:
             self._on_progress(stage, done, total)
 
@@ -71,7 +71,7 @@ class Search:
         self._ranking: list[int] = []
 
     def rank(self, *, bounds_too: bool) -> None:
-        """Signatures of all actions and their order; bounds in the same pass if wanted, while what they share is at hand."""
+        """Signatures and order of all actions; bounds in the same pass if wanted, while the forms they share are in memory."""
         different = self._different(range(len(self._actions)))
         done = 0
         for places in self._parts(different):

@@ -1,4 +1,4 @@
-"""Bounds of the objective and its exact value for each candidate, in ranking order, beside what a person knows of it.
+"""Bounds of the objective and its exact value for each candidate, in ranking order, beside a table of its other properties.
 
 A candidate whose lower bound lies right of the dashed line, the upper bound of the chosen one, cannot be the best: that is
 how Algorithm 1 of Kitanov and Indelman (arXiv 1903.00927) rules actions out without evaluating them.

@@ -1,4 +1,4 @@
-"""The one door to matplotlib: a figure measured in inches, panels on it, and a key; typed where matplotlib is not.
+"""Matplotlib behind typed classes: a figure measured in inches, panels on it, and a key.
 
 Figures belong to no graphical backend and touch no global state: they are saved, not shown.
 """

@@ -124,7 +124,7 @@ def draw_topologies(each: Deliberation, world: World, *, name: str) -> Figure:
 
 
 def draw_comparison(runs: Sequence[ComparedRun], *, baseline: str) -> Figure:
-    """Expected error of each strategy beside the baseline's on the same seed, a row a strategy and a dot a seed."""
+    """Expected error of each strategy beside the baseline's on the same seed: one row per strategy, one dot per seed."""
     found = [each for each in summarised(runs, baseline=baseline) if each.strategy != baseline]
     reference = {run.seed: run.error_shared for run in runs if run.strategy == baseline}
     row, left, width = 0.42, 1.75, 4.6
@@ -157,7 +157,7 @@ def draw_comparison(runs: Sequence[ComparedRun], *, baseline: str) -> Figure:
             0.25,
             canvas.height - 0.42,
             "Expected error of the map that stood before the last session",
-            "a dot a seed, mean over redrawn noise; bar: median; left of zero is better",
+            "one dot per seed, mean over redrawn noise; bar: median; left of zero is better",
         )
     return canvas.figure
 

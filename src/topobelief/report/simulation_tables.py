@@ -1,4 +1,4 @@
-"""Runs of the simulation for a terminal: a line a leg, a run's metrics, and strategies side by side."""
+"""Runs of the simulation for a terminal: one line per leg, a run's metrics, and strategies side by side."""
 
 from __future__ import annotations
 
@@ -51,8 +51,8 @@ def metrics_table(record: Record) -> Table:
         rows.append((label, f"{whole:.3f} m on all poses, {before:.3f} m on those before the last leg"))
     if "predicted_entropy" in values:
         unit = f"nats ({record.options.objective})"
-        told = ", ".join(f"{name} {number(values[f'{name}_entropy'])}" for name in ("prior", "predicted", "achieved"))
-        rows.append(("entropy of the last leg", f"{told} {unit}"))
+        entropies = ", ".join(f"{name} {number(values[f'{name}_entropy'])}" for name in ("prior", "predicted", "achieved"))
+        rows.append(("entropy of the last leg", f"{entropies} {unit}"))
     driven = values["driven_seconds"]
     for label, name in (("making candidates", "candidates_seconds"), ("deciding", "decision_seconds")):
         share = f", {values[name] / driven:.3%} of the time driven" if driven else ""
@@ -61,7 +61,7 @@ def metrics_table(record: Record) -> Table:
 
 
 def comparison_table(found: Sequence[StrategySummary], *, baseline: str) -> Table:
-    """A line a strategy: medians over the seeds, and the share of seeds in which it beat the baseline."""
+    """One line per strategy: medians over the seeds, and the share of seeds in which it beat the baseline."""
     table = Table(
         box=box.SIMPLE_HEAD,
         padding=(0, 1),

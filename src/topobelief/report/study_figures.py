@@ -1,4 +1,5 @@
-"""What a study found, a figure a question: how often the best was chosen, what was lost, how all were ranked, how long it took.
+"""What a study found, one figure per question: how often the best was chosen, what was lost, how all were ranked, how long it
+took.
 
 Each figure has a panel for each session and objective and a row for each strategy, with a line in it for each noise. Medians
 are dots, quartiles thick, 10 to 90 % thin; for shares the thin line is the 95 % interval.
@@ -70,7 +71,7 @@ class _Mark:
 
 @dataclass(frozen=True, slots=True)
 class _Question:
-    """What a figure asks, and how its axis is."""
+    """The question that a figure answers, and its axis."""
 
     title: str
     subtitle: str

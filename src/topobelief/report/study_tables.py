@@ -1,4 +1,4 @@
-"""A study's summary for a terminal: one line a strategy, under a line for each session, objective and noise."""
+"""A study's summary for a terminal: one line per strategy, under a line for each session, objective and noise."""
 
 from __future__ import annotations
 

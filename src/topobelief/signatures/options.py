@@ -1,4 +1,4 @@
-"""What a signature can be told."""
+"""Options of the signatures."""
 
 from __future__ import annotations
 

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from topobelief.arrays import BoolArray, FloatArray
+from topobelief.conversions.gtsam import load_gtsam
 from topobelief.errors import InvalidInputError
 from topobelief.geometry import SE2_GROUP
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.io.gtsam import load_gtsam
 from topobelief.simulation.factor import CLOSURE, Factor
 
 _PRIOR_SIGMA = 1e-4  # m and rad
@@ -73,7 +73,7 @@ class BackEnd:
         Parameters
         ----------
         factors
-            Between poses that exist and at most the next one, which hangs on its odometry factor.
+            Between poses that exist and at most the next one, to which its odometry factor leads.
 
         Raises
         ------
@@ -94,7 +94,7 @@ class BackEnd:
         self._update([self._between(factor, robust=factor.kind == CLOSURE) for factor in factors], poses)
 
     def robustify(self) -> None:
-        """Tell right closures from wrong ones, all of them anew, and start again from the right ones' estimate."""
+        """Separate right closures from wrong ones, all of them anew, and start again from the right ones' estimate."""
         if not any(factor.kind == CLOSURE for factor in self._factors):
             return
         gtsam = self._gtsam

@@ -1,7 +1,7 @@
 """Strategies compared on expectations: each recorded graph gets the injected noise again and again.
 
-One draw of noise says little of a choice, since errors of a pose graph spread by a factor of two. So the runs of a seed share
-all sessions but the last, each strategy drives that one, and of each graph that comes out the error is the mean over many
+One draw of noise says little about a choice, since errors of a pose graph spread by a factor of two. So the runs of a seed
+share all sessions but the last, each strategy drives that one, and of each graph that comes out the error is the mean over many
 redraws of N(0, diag(sigma_p², sigma_p², sigma_theta²)) on its registered factors. The k-th draw is the same for the factors
 that graphs share.
 """
@@ -136,7 +136,7 @@ def restricted(graph: PoseGraph, num_poses: int) -> PoseGraph:
 
 
 def compared_records(scenario: Scenario, options: RunOptions, strategies: Sequence[str]) -> Iterator[Record]:
-    """A run a strategy, which share all sessions but the last.
+    """One run per strategy, all of which share all sessions but the last.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ def compared_run(record: Record, noise: InjectedNoise, *, num_redraws: int) -> C
 
 
 def summarised(runs: Sequence[ComparedRun], *, baseline: str = SHARED_STRATEGY) -> list[StrategySummary]:
-    """One line a strategy, in the order in which they first appear; gains are nan without the baseline."""
+    """One line per strategy, in the order in which they first appear; gains are nan without the baseline."""
     reference = {run.seed: run for run in runs if run.strategy == baseline}
     found: list[StrategySummary] = []
     for strategy in dict.fromkeys(run.strategy for run in runs):

@@ -52,7 +52,7 @@ Progress = Callable[[str, float, float], None]
 _MAX_ATTEMPTS = 12  # legs to one goal, after which the robot gives up
 _MAX_STUCK = 3  # of which it got stuck
 _TRACK_PERIOD = 0.2  # s
-_LOOK_PERIOD, _LOOK_AHEAD = 0.3, 1.2  # s and m, in which a robot without a floor plan looks out for walls
+_LOOK_PERIOD, _LOOK_AHEAD = 0.3, 1.2  # s and m, in which a robot without a floor plan looks for walls
 _BRUSH = 0.03  # m beside its chassis that a wall may come near
 _ROBOT, _NOISE, _CHOICE = range(3)  # streams of random numbers
 
@@ -68,7 +68,7 @@ class Episode:
         graph and map.
     displaced : (x, y, theta), optional
         Where the robot is put down relative to where it ended when a run continues, metres and radians; a little beside,
-        where a wall is too near. It is not told.
+        where a wall is too near. SLAM is not given it.
     """
 
     def __init__(

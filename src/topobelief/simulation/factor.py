@@ -1,4 +1,4 @@
-"""What the front end tells the back end: a relative pose, and how well it is known."""
+"""What the front end passes to the back end: a relative pose, and how well it is known."""
 
 from __future__ import annotations
 

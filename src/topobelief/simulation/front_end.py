@@ -1,14 +1,14 @@
 """The front end: key poses, odometry factors from wheels and scans, and loop closures.
 
 An odometry factor fuses two independent measurements of the same motion, wheel odometry with its slip and the match of the two
-scans. In the tangent at the wheels' pose it is the product of two Gaussians: the laser decides nearly everything, but for the
-direction of a bare corridor, of which its walls say nothing and its information knows.
+scans. In the tangent at the wheels' pose it is the product of two Gaussians: the laser determines nearly everything except the
+position along a bare corridor, where walls give no information and the information matrix of the match says so.
 
 Between key poses the robot is tracked: every few centimetres its scan is matched with that of the last key pose, starting from
 where the scan before put it. So a match never starts far from its optimum, and wheels that spin are noticed within those few
 centimetres. Where a good match and the wheels contradict each other, the wheels slipped: their covariance is widened until the
-disagreement is what it expects, and the laser decides. Where the scans do not match, what was tracked so far and the wheels
-since then remain, and the factor says why.
+disagreement is what it expects, and the laser determines the motion. Where the scans do not match, what was tracked so far and
+the wheels since then remain, and the factor says why.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from topobelief.arrays import FloatArray
-from topobelief.errors import InvalidInputError
+from topobelief.errors import InvalidInputError, require_positive
 from topobelief.geometry import SE2_GROUP
 from topobelief.graph.information import block_isotropic
 from topobelief.simulation.factor import CLOSURE, ODOMETRY, Factor
@@ -104,8 +104,7 @@ class FrontEndSettings:
             "encoder_sigma",
             "odometry_correspondence_distance",
         ):
-            if not (math.isfinite(value := getattr(self, name)) and value > 0):
-                raise InvalidInputError(f"expected {name} above 0, got {value}")
+            require_positive(name, getattr(self, name))
         if self.min_index_gap < 2:
             raise InvalidInputError(f"expected min_index_gap of at least 2, got {self.min_index_gap}")
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from topobelief.arrays import BoolArray, FloatArray
-from topobelief.errors import InvalidInputError
+from topobelief.errors import InvalidInputError, require_positive
 from topobelief.simulation.scan import Scan
 from topobelief.simulation.walls import wall_segments
 from topobelief.world import World
@@ -22,7 +22,7 @@ from topobelief.world import World
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LidarSettings:
-    """A lidar that looks all around, in revolutions that are over in no time.
+    """A lidar with a view of 360 degrees, whose revolutions take no time.
 
     Parameters
     ----------
@@ -50,9 +50,8 @@ class LidarSettings:
     def __post_init__(self) -> None:
         if self.num_beams < 4:
             raise InvalidInputError(f"expected num_beams of at least 4, got {self.num_beams}")
-        for name, value in (("rate", self.rate), ("max_range", self.max_range)):
-            if not (math.isfinite(value) and value > 0):
-                raise InvalidInputError(f"expected a lidar {name} above 0, got {value}")
+        require_positive("a lidar rate", self.rate)
+        require_positive("a lidar max_range", self.max_range)
         if not (math.isfinite(self.range_noise) and self.range_noise >= 0):
             raise InvalidInputError(f"expected range_noise of at least 0 m, got {self.range_noise}")
         if not 0 <= self.nan_share <= 1:

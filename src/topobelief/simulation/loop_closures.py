@@ -32,7 +32,7 @@ def closure_candidates(
     Parameters
     ----------
     poses : shape (n, 3)
-        Estimate[float] of all key poses.
+        Estimate of all key poses.
     occupancy
         The map so far, in which nothing may stand between the two; None: no such test.
     search_radius
@@ -73,7 +73,7 @@ class _Candidate:
 
 
 class PairwiseConsistency:
-    """Which closures to believe, as they come.
+    """Decides which closures to believe, as they come.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class PairwiseConsistency:
     min_agreeing
         Closures that must agree before any of them is believed.
     window
-        Key poses back to which closures are compared; what has not found company by then is forgotten.
+        Key poses back to which closures are compared; a closure that agrees with too few others by then is dropped.
     """
 
     def __init__(self, *, confidence: float, min_agreeing: int, window: int) -> None:

@@ -1,8 +1,8 @@
 """A world with a differential-drive robot in it, as a MuJoCo model.
 
 Walls are upright boxes that stand behind the boundary of the free region, so the free side of each is exact. The robot is a
-Pioneer's: an upright cylinder around the axle, two driven wheels and a caster behind. What collides with what is settled by
-bits: wheels and caster with the floor alone, the cylinder with walls alone.
+Pioneer's: an upright cylinder around the axle, two driven wheels and a caster behind. Collision bits determine what collides
+with what: wheels and caster with the floor alone, the cylinder with walls alone.
 
 Measured before choosing: cylinder wheels wander by themselves (0.7 rad in 41 m), spheres with an elliptic friction cone and
 `impratio` 10 least of all; the caster glides because its contact has priority over the floor's.

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from topobelief.arrays import BoolArray, FloatArray, IntArray
-from topobelief.errors import InvalidInputError, require_choice
+from topobelief.errors import InvalidInputError, require_choice, require_positive
 from topobelief.geometry.se2 import wrap_angle
 from topobelief.io.files import StrPath
 from topobelief.io.ros_map import write_ros_map
@@ -92,8 +92,7 @@ class OccupancyMap:
         poses = np.array(poses, dtype=np.float64).reshape(-1, 3)
         if len(poses) != len(scans):
             raise InvalidInputError(f"expected a scan for each of {len(poses)} poses, got {len(scans)}")
-        if not (math.isfinite(resolution) and resolution > 0):
-            raise InvalidInputError(f"expected a resolution above 0 m, got {resolution}")
+        require_positive("a resolution", resolution, unit="m")
         x_min, y_min, x_max, y_max = bounds
         shape = (math.ceil((y_max - y_min) / resolution - 1e-9), math.ceil((x_max - x_min) / resolution - 1e-9))
         if previous is None:

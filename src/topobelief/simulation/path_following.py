@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from topobelief.arrays import FloatArray, frozen_floats
-from topobelief.errors import InvalidInputError
+from topobelief.errors import InvalidInputError, require_positive
 from topobelief.geometry import wrap_angle
 
 _SAMPLE_SPACING = 0.02  # m, between the points of the path that are looked at
@@ -60,8 +60,7 @@ class FollowerSettings:
 
     def __post_init__(self) -> None:
         for name in self.__slots__:
-            if not (math.isfinite(value := getattr(self, name)) and value > 0):
-                raise InvalidInputError(f"expected a path follower's {name} above 0, got {value}")
+            require_positive(f"a path follower's {name}", getattr(self, name))
 
 
 class PathFollower:

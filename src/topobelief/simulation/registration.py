@@ -1,4 +1,4 @@
-"""Scan matching: where one scan was made in the frame of another, how well they fit, and how much that is worth.
+"""Scan matching: where one scan was made in the frame of another, how well they fit, and how accurate the match is.
 
 Planar scans are extruded to a few levels in z, so that generalized ICP (Segal, Haehnel and Thrun, "Generalized-ICP", RSS 2009;
 here small_gicp) sees upright walls: it aligns plane to plane and comes out ten times closer than on flat scans. Its Hessian
@@ -35,7 +35,7 @@ _MAX_ITERATIONS = 30
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RegistrationSettings:
-    """How scans are matched, and what a match is worth.
+    """How scans are matched, and how accurate a match is taken to be.
 
     Parameters
     ----------

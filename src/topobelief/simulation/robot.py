@@ -123,7 +123,7 @@ class Robot:
         return self._last_scan
 
     def place(self, pose: FloatArray) -> None:
-        """Lift the robot and put it down at rest elsewhere; the encoders do not notice, and no time passes.
+        """Lift the robot and put it down at rest elsewhere; the encoders do not change, and no time passes.
 
         Parameters
         ----------

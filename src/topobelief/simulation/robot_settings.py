@@ -1,11 +1,11 @@
-"""The robot's size, its motors, and what its wheel encoders get wrong."""
+"""The robot's size, its motors, and the errors of its wheel encoders."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
-from topobelief.errors import InvalidInputError
+from topobelief.errors import InvalidInputError, require_positive
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,8 +52,7 @@ class RobotSettings:
             "max_acceleration",
             "control_period",
         ):
-            if not (math.isfinite(value := getattr(self, name)) and value > 0):
-                raise InvalidInputError(f"expected a robot's {name} above 0, got {value}")
+            require_positive(f"a robot's {name}", getattr(self, name))
         for name in ("wheel_slip", "encoder_noise"):
             if not (math.isfinite(value := getattr(self, name)) and value >= 0):
                 raise InvalidInputError(f"expected a robot's {name} of at least 0, got {value}")

@@ -43,7 +43,7 @@ class Scenario:
     ----------
     name
     world
-        Its walls, and the floor plan that the robot knows unless it is told to start with none.
+        Its walls, and the floor plan that the robot knows unless the run starts with an empty map.
     start : (x, y, theta)
         Metres and radians; known to the robot, as a pose graph needs one known pose.
     goals

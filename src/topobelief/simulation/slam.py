@@ -96,7 +96,7 @@ class Slam:
 
     @property
     def scans(self) -> list[Scan]:
-        """One a key pose."""
+        """One per key pose."""
         return self._front.scans
 
     def wants_key_pose(self, wheel_odometry: FloatArray) -> bool:
@@ -166,7 +166,7 @@ class Slam:
         return nowhere if math.hypot(x, y) < _STILL and abs(theta) < _STILL else match.pose
 
     def settle(self) -> None:
-        """At a goal: tell outliers among the closures from the rest, and drop them."""
+        """At a goal: find the outliers among the closures, and drop them."""
         for back_end in dict.fromkeys((self._driving, self._deciding)):
             back_end.robustify()
         self._map_is_stale = True

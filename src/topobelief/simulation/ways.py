@@ -1,4 +1,4 @@
-"""Ways to a goal in the world as the robot knows it, and what its laser sees to stand in one."""
+"""Ways to a goal in the world as the robot knows it, and obstacles on one of them that its laser sees."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Strategies: how one of several candidates is chosen, a kind a file, and what each answers."""
+"""Strategies: how one of several candidates is chosen, one file per kind, and the form of the answer."""

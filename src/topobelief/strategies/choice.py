@@ -1,4 +1,4 @@
-"""What a strategy answers: the chosen candidate, the seconds that took, and the reasons."""
+"""The answer of a strategy: the chosen candidate, the seconds that the choice took, and the reasons for it."""
 
 from __future__ import annotations
 

@@ -1,21 +1,21 @@
-"""A decision to make, as every strategy gets it."""
+"""A decision to make, in the form in which every strategy gets it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from importlib.util import find_spec
 
 from topobelief.arrays import FloatArray
 from topobelief.bounds.entropy_bounds import Determinant
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
+from topobelief.optional import has_kernels
 from topobelief.planning.planner import Planner
 
 
 def installed_bounds() -> str:
     """Bounds anchored in the prior where numba is installed, which compiles them; Fischer's otherwise."""
-    return "fischer" if find_spec("numba") is None else "anchored"
+    return "anchored" if has_kernels() else "fischer"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -31,7 +31,7 @@ class Question:
     lengths : shape (K,)
         Of the paths, metres.
     random_scores : shape (K,)
-        Random numbers drawn by whoever asks; "random" takes the action with the largest. So strategies draw nothing themselves.
+        Random numbers drawn by the caller; "random" takes the action with the largest. Strategies draw none themselves.
     objective, bounds, determinant
         As the planner takes them. Default of the bounds: `installed_bounds`.
     """
@@ -45,7 +45,7 @@ class Question:
     determinant: Determinant = "cholesky"
 
     def planner(self, signature: str = "spanning_trees") -> Planner:
-        """For this question; dense spectra are allowed, since whoever asks named the strategy."""
+        """For this question; dense spectra are allowed, since the caller named the strategy."""
         return Planner(
             self.graph,
             objective=self.objective,

@@ -1,4 +1,4 @@
-"""Planar shapes: the one door to shapely, with arrays of coordinates on this side and types that can be checked.
+"""Planar shapes: shapely behind functions of coordinate arrays, with types that can be checked.
 
 Predicates are exact to rounding; shapes with round parts have chords in place of arcs.
 """
@@ -64,12 +64,12 @@ def together(shapes: ShapeArray) -> MultiPolygon:
 
 
 def union(shapes: ShapeArray) -> Shape:
-    """All that any of the shapes covers."""
+    """The union of the shapes."""
     return _shapely.union_all(shapes)
 
 
 def difference(shape: Shape, without: Shape) -> Shape:
-    """What is left of a shape."""
+    """A shape without the part that another one covers."""
     return _shapely.difference(shape, without)
 
 

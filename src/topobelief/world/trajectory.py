@@ -1,6 +1,6 @@
 """The region that a robot is known to have driven through: all that lies within a width of its trajectory.
 
-Real pose graphs come without a map; where the robot has been, it can go again. The region is the union of one
+Real pose graphs come without a map, but where the robot has been, it can drive again. The region is the union of one
 capsule (a segment with round ends) for each step of the odometry.
 """
 
@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from topobelief.arrays import IntArray
-from topobelief.errors import InvalidInputError
+from topobelief.errors import InvalidInputError, require_positive
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.world import shapes
 
@@ -38,8 +38,7 @@ def region_of_trajectory(graph: PoseGraph, width: float | None = None) -> shapes
         )
     if width is None:
         width = default_width(graph)
-    if not (np.isfinite(width) and width > 0):
-        raise InvalidInputError(f"expected a width above 0 m, got {width}")
+    require_positive("a width", width, unit="m")
     steps = odometry_steps(graph)
     alone = np.setdiff1d(np.arange(graph.num_poses), steps)
     starts, ends = graph.positions[steps[:, 0]], graph.positions[steps[:, 1]]
@@ -63,7 +62,7 @@ def default_width(graph: PoseGraph) -> float:
     travelled = np.cumsum(lengths)
     if len(lengths) == 0 or travelled[-1] == 0:
         raise InvalidInputError(
-            "expected edges between consecutive poses to tell how wide the trajectory is, got none with a length; "
+            "expected edges between consecutive poses from which to take the width, got none with a length; "
             "give a width in metres"
         )
     return float(_WIDTH_PER_STEP * lengths[np.searchsorted(travelled, travelled[-1] / 2)])

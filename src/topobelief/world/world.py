@@ -1,6 +1,6 @@
 """A planar world as its free region: polygons with holes, whatever the world was made from.
 
-Boxes, polygons, an occupancy grid and a trajectory all end as the same thing, the open set of places that are free.
+Boxes, polygons, an occupancy grid and a trajectory all become the same thing, the open set of places that are free.
 Its boundary is everything that can be hit, so one exact distance (to the boundary) answers every question: the
 clearance of a point, whether a disc may move along a segment, whether two points see each other. What lies beyond
 the bounds is not free. Coordinates are metres in the world frame of the pose graph.
@@ -31,7 +31,7 @@ _EROSION_SLACK = 0.02  # of the radius: twice the error of an erosion
 
 @dataclass(frozen=True, eq=False, init=False)
 class World:
-    """The places that are free, and what moving and looking among them comes to.
+    """The places that are free, and answers to where a robot may move and what it can see among them.
 
     Parameters
     ----------
@@ -143,20 +143,23 @@ class World:
 
     @classmethod
     def from_trajectory(cls, graph: PoseGraph, width: float | None = None) -> World:
-        """Free where the robot has been: within `width` of its odometry, for a pose graph that has no map.
+        """For a pose graph without a map: free where the robot has been, within `width` of its odometry.
 
         Parameters
         ----------
         graph
-            In SE(2), at its estimate. The robot has been at its poses and, where an edge joins two consecutive poses,
-            on the segment between them. Edges between other poses (closures) say nothing of what lies between.
+            In SE(2), at its estimate. The robot has been at its poses and, where an edge joins two poses of consecutive
+            index (odometry), on the segment between them. Edges between other poses (closures) say nothing of what lies
+            between, and neither do two consecutive poses that no edge joins. A pose without odometry is free within a disc
+            of its own; in a graph without any odometry all poses are, and the default width is refused.
         width
-            Metres to each side. Default: twice the edge length on which the robot covered its median metre.
+            Metres to each side. Default: twice the length of the odometry edge on which the robot covered its median metre.
 
         Raises
         ------
         InvalidInputError
-            For a graph in SE(3), whose storeys a plane would join, and for a width that is not positive.
+            For a graph in SE(3), whose storeys a plane would join; for a width that is not positive; for the default width
+            where no odometry edge has a length.
         """
         return cls(region_of_trajectory(graph, width))
 
@@ -208,7 +211,7 @@ class World:
         """All places that the centre of a disc can be moved to from a point, slightly too large.
 
         The region is eroded by 0.98 of the radius, so whatever the component leaves out cannot be reached.
-        Its holes are the obstacles around which there are ways on both sides; walls that the disc cannot pass
+        Its holes are the obstacles that can be passed on both sides; walls that the disc cannot pass
         between are one hole, and those joined to the outside are none.
 
         Parameters

@@ -14,7 +14,7 @@ _SHARED = ("where", "holds if", "published")
 
 
 def claims_table(claims: Sequence[Claim]) -> Table:
-    """One line a claim and case."""
+    """One line per claim and case."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
     for name in ("claim", "case", "measured", "held in", "holds"):
         table.add_column(name, overflow="fold", no_wrap=name in ("held in", "holds"))
@@ -25,7 +25,7 @@ def claims_table(claims: Sequence[Claim]) -> Table:
 
 
 def claims_markdown(claims: Sequence[Claim]) -> str:
-    """A table a topic, in Markdown; what all of its lines share stands above it."""
+    """One table per topic, in Markdown; what all of its lines share stands above it."""
     topics: dict[str, list[Claim]] = {}
     for claim in claims:
         topics.setdefault(claim.topic, []).append(claim)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ _LOOKS = (
     ("fischer", "Fischer's bounds", "#7DB8DE", 4.0),
     ("anchored", "anchored bounds", style.SURVIVOR, 2.2),
 )
+_SIGNATURES = tuple(name for name in SIGNATURE_LOOKS if name != "von_neumann_normalized")
 
 
 def draw_bounds(rows: Sequence[ActionRow], seed: int) -> Figure:
@@ -32,17 +33,8 @@ def draw_bounds(rows: Sequence[ActionRow], seed: int) -> Figure:
     seed
         The one that is drawn.
     """
-    found = cases(rows)
     with style.style():
-        grid = Grid(len(SESSIONS), len(NOISES), width=2.75, height=2.0)
-        for row, session in enumerate(SESSIONS):
-            for column, xi in enumerate(NOISES):
-                panel = grid.panel(row, column, f"{session}, ξ = {xi:g}")
-                _draw_case(panel, sorted(found[session, xi, seed], key=lambda each: each.joint))
-                if column == 0:
-                    panel.axes.set_ylabel("joint entropy (nats)")
-                if row == len(SESSIONS) - 1:
-                    panel.axes.set_xlabel("actions, least entropy first")
+        grid = _grid_of_cases(cases(rows), seed, _draw_bounds_of_case, height=2.0, x_label="actions, least entropy first")
         grid.headline(
             "Joint entropy of each action and its bounds", f"seed {seed}; where intervals are short, all bounds meet J"
         )
@@ -55,7 +47,8 @@ def draw_bounds(rows: Sequence[ActionRow], seed: int) -> Figure:
     return grid.canvas.figure
 
 
-def _draw_case(panel: Panel, rows: Sequence[ActionRow]) -> None:
+def _draw_bounds_of_case(panel: Panel, unordered: Sequence[ActionRow]) -> None:
+    rows = sorted(unordered, key=lambda each: each.joint)
     x = np.arange(1, len(rows) + 1)
     for family, _, colour, width in _LOOKS:
         lower, upper = _column(rows, f"{family}_lower"), _column(rows, f"{family}_upper")
@@ -84,42 +77,51 @@ def draw_signatures(rows: Sequence[ActionRow], seed: int) -> Figure:
     seed
         The one that is drawn.
     """
-    found = cases(rows)
-    names = [name for name in SIGNATURE_LOOKS if name != "von_neumann_normalized"]
     with style.style():
-        grid = Grid(len(SESSIONS), len(NOISES), width=2.75, height=2.3)
-        for row, session in enumerate(SESSIONS):
-            for column, xi in enumerate(NOISES):
-                panel = grid.panel(row, column, f"{session}, ξ = {xi:g}")
-                drawn = found[session, xi, seed]
-                J = _column(drawn, "joint")
-                for line, name in enumerate(names):
-                    label, colour, mark = SIGNATURE_LOOKS[name]
-                    s = _column(drawn, name)
-                    look: dict[str, Any] = {
-                        "color": colour,
-                        "marker": mark,
-                        "linestyle": "none",
-                        "markersize": 4.2,
-                        "alpha": 0.75,
-                    }
-                    panel.line(np.column_stack([(s - s.min()) / np.ptp(s), J]), markeredgewidth=0, **look)
-                    quality = decision_quality(J, s)
-                    text = f"{label}: ρ {signed(quality.spearman, 3)}, loses {quality.error:.2g}"
-                    place = {"transform": panel.axes.transAxes, "ha": "right", "va": "top", "color": colour, "fontsize": 7.2}
-                    panel.axes.text(0.99, 0.98 - 0.085 * line, text, **place)
-                if column == 0:
-                    panel.axes.set_ylabel("joint entropy (nats)")
-                if row == len(SESSIONS) - 1:
-                    panel.axes.set_xlabel("signature, from its least to its largest")
-                light_grid(panel.axes)
+        label = "signature, from its least to its largest"
+        grid = _grid_of_cases(cases(rows), seed, _draw_signatures_of_case, height=2.3, x_label=label)
         grid.headline(
             "Signatures against the joint entropy", f"seed {seed}; ρ: Spearman's rank correlation of J with −s; losses in nats"
         )
-        looks = [SIGNATURE_LOOKS[name] for name in names]
+        looks = [SIGNATURE_LOOKS[name] for name in _SIGNATURES]
         entries = [Entry(label, color=colour, marker=mark, linestyle="none", markersize=5) for label, colour, mark in looks]
         grid.canvas.key(entries, MARGIN, 0.14, corner="lower left", columns=len(entries))
     return grid.canvas.figure
+
+
+def _draw_signatures_of_case(panel: Panel, rows: Sequence[ActionRow]) -> None:
+    J = _column(rows, "joint")
+    for line, name in enumerate(_SIGNATURES):
+        label, colour, mark = SIGNATURE_LOOKS[name]
+        s = _column(rows, name)
+        look: dict[str, Any] = {"color": colour, "marker": mark, "linestyle": "none", "markersize": 4.2, "alpha": 0.75}
+        panel.line(np.column_stack([(s - s.min()) / np.ptp(s), J]), markeredgewidth=0, **look)
+        quality = decision_quality(J, s)
+        text = f"{label}: ρ {signed(quality.spearman, 3)}, loses {quality.error:.2g}"
+        place = {"transform": panel.axes.transAxes, "ha": "right", "va": "top", "color": colour, "fontsize": 7.2}
+        panel.axes.text(0.99, 0.98 - 0.085 * line, text, **place)
+    light_grid(panel.axes)
+
+
+def _grid_of_cases(
+    found: Mapping[tuple[str, float, int], Sequence[ActionRow]],
+    seed: int,
+    draw: Callable[[Panel, Sequence[ActionRow]], None],
+    *,
+    height: float,
+    x_label: str,
+) -> Grid:
+    """One panel per session and noise, with the joint entropy upwards."""
+    grid = Grid(len(SESSIONS), len(NOISES), width=2.75, height=height)
+    for row, session in enumerate(SESSIONS):
+        for column, xi in enumerate(NOISES):
+            panel = grid.panel(row, column, f"{session}, ξ = {xi:g}")
+            draw(panel, found[session, xi, seed])
+            if column == 0:
+                panel.axes.set_ylabel("joint entropy (nats)")
+            if row == len(SESSIONS) - 1:
+                panel.axes.set_xlabel(x_label)
+    return grid
 
 
 def _column(rows: Sequence[ActionRow], name: str) -> FloatArray:

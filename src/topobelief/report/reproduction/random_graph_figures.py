@@ -38,7 +38,7 @@ def draw_random_graphs(rows: Sequence[RandomGraphRow]) -> Figure:
             panel.axes.text(0.98, 0.98, text, **place)
             panel.axes.set_xlabel("signature a pose (nats)")
             if column == 0:
-                panel.axes.set_ylabel("joint entropy a pose (nats)")
+                panel.axes.set_ylabel("joint entropy per pose (nats)")
             light_grid(panel.axes)
         subtitle = "ρ: Spearman's rank correlation of J with −s, 1 is perfect; slopes are those of J against s"
         grid.headline("Signatures against the entropy on random pose graphs", subtitle)

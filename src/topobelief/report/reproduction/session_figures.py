@@ -20,7 +20,7 @@ _CONFIDENCE = math.sqrt(-2 * math.log(0.05))  # standard deviations of a plane's
 
 
 def draw_candidates(sessions: Sequence[PlanningSession], best: Sequence[int]) -> Figure:
-    """Candidate paths over the roadmap, a panel a session.
+    """Candidate paths over the roadmap, one panel per session.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def draw_candidates(sessions: Sequence[PlanningSession], best: Sequence[int]) ->
 
 
 def draw_uncertainty(pairs: Sequence[tuple[TrajectoryUncertainty, TrajectoryUncertainty]]) -> Figure:
-    """Topology and covariances after the best and after the worst action; a row a session.
+    """Topology and covariances after the best and after the worst action; one row per session.
 
     Parameters
     ----------

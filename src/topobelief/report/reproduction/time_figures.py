@@ -63,7 +63,7 @@ def draw_times(rows: Sequence[TimeRow]) -> Figure:
 
 
 def draw_speed_ratios(rows: Sequence[RandomGraphRow]) -> Figure:
-    """How many times faster signatures are on random graphs; medians over graphs, a line a density."""
+    """How many times faster signatures are on random graphs; medians over graphs, one line per density."""
     quotients: tuple[tuple[str, Callable[[RandomGraphRow], float]], ...] = (
         ("t of s_ST / t of ŝ_VN", lambda row: row.spanning_trees_seconds / row.von_neumann_approx_seconds),
         ("t of standard / t of s_ST", lambda row: row.standard_seconds / row.spanning_trees_seconds),

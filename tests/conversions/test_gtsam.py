@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given
 
 from graphs import SE2_GROUP, SE3_GROUP, pose_graphs
+from topobelief.conversions.gtsam import from_gtsam, to_gtsam
 from topobelief.errors import InvalidInputError
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.g2o import read_g2o, write_g2o
-from topobelief.io.gtsam import from_gtsam, to_gtsam
 from topobelief.symbols import node_name
 
 UNIT = gtsam.noiseModel.Unit.Create(3)

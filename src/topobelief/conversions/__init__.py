@@ -1,0 +1,1 @@
+"""Pose graphs to and from the objects of other libraries, one file per library."""
