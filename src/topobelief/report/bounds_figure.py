@@ -120,7 +120,7 @@ def _draw_threshold(panel: Panel, decision: Decision) -> list[Entry]:
     look: dict[str, Any] = {"color": style.INK, "linewidth": 0.9, "linestyle": (0, (4, 2))}
     panel.axes.axvline(threshold, zorder=4, **look)
     evaluated = not math.isnan(decision.entropies[decision.best])
-    return [Entry("least value found" if evaluated else "its upper bound", **look)]
+    return [Entry("least value found" if evaluated else "upper bound of the chosen", **look)]
 
 
 def _write_columns(canvas: Canvas, decision: Decision) -> None:
