@@ -95,7 +95,7 @@ def as_html(table: DecisionTable, sentence: str) -> str:
 
     def line(tag: str, cells: tuple[str, ...], look: str = "") -> str:
         aligned = (
-            f'<{tag} style="text-align: {"left" if column.is_text else "right"}">{escape(text)}</{tag}>'
+            f'<{tag} style="padding: 0.1em 0.6em; text-align: {"left" if column.is_text else "right"}">{escape(text)}</{tag}>'
             for text, column in zip(cells, table.columns, strict=True)
         )
         return f"<tr{look}>{''.join(aligned)}</tr>"
