@@ -51,7 +51,7 @@ def test_exact_values_have_their_cost_added_as_the_bounds_have(make_decision):
     decision = make_decision(3, cost=4.0)
     figure = draw_bounds(decision, entropies=[-100.0, -110.0, -120.0])
     assert marks(figure, "white").tolist() == [[-116.0, 0], [-106.0, 1], [-96.0, 2]]
-    assert figure.axes[0].get_xlabel().endswith(", plus cost")
+    assert figure.axes[0].get_xlabel().endswith(", plus cost (nats)")
 
 
 def test_values_that_the_decision_needed_are_told_from_those_that_it_did_not(make_decision):
@@ -67,6 +67,15 @@ def test_missing_bounds_leave_rows_empty_and_no_dashed_line(make_decision):
     figure = draw_bounds(make_decision(4, lower=nothing, upper=nothing, error_bound=np.inf))
     assert intervals(figure) == {}
     assert key(figure) == []
+
+
+def test_a_single_candidate_is_compared_with_nothing(make_decision):
+    figure = draw_bounds(make_decision(1), entropies=[-100.0])
+    assert key(figure) == ["chosen", "exact"]
+    assert [text.get_text() for text in figure.texts[-2:]] == [
+        "path 0, the only candidate",
+        "there is nothing to compare it with",
+    ]
 
 
 def test_the_title_counts_what_was_ruled_out(make_decision):

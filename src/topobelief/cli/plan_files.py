@@ -7,7 +7,6 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +22,7 @@ from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.files import atomic_file
 from topobelief.io.json_values import without_nan
 from topobelief.planning.decision import Decision
+from topobelief.version import __version__
 from topobelief.world import World
 
 
@@ -80,7 +80,7 @@ def document(result: PlanResult) -> dict[str, object]:
             "x_y_yaw": path_poses(best).tolist(),
         },
         "notes": list(result.notes),
-        "topobelief": version("topobelief"),
+        "topobelief": __version__,
         "graph": {"num_poses": graph.num_poses, "num_edges": graph.num_edges, "chi2": graph.chi2},
         "start": (start.place if start.distance(graph) else graph.poses[start.pose]).tolist(),
         "start_pose": {"index": start.pose, "id": int(graph.ids[start.pose])},

@@ -28,6 +28,7 @@ from topobelief.planning.decision_quality import rank_correlation
 from topobelief.planning.planner import Planner
 from topobelief.report.tables import candidate_table
 from topobelief.symbols import find_node, node_name
+from topobelief.wording import counted
 from topobelief.world import World
 from topobelief.world.trajectory import default_width
 
@@ -167,10 +168,10 @@ def find_candidates(
     paths, lengths = routes.paths, routes.lengths
     classes = count_classes(routes.roadmap, paths)
     at_least = "" if classes.is_exact else "at least "
-    num_classes = at_least + _counted(classes.number, "homotopy class", "homotopy classes")
+    num_classes = at_least + counted(classes.number, "homotopy class", "homotopy classes")
     fewer = f" of {rule.num_paths} asked for" if len(paths) < rule.num_paths else ""
     reporter.say(
-        f"{_counted(len(paths), 'path')}{fewer} from {_shown(begin.place)} to {_shown(goal)}: "
+        f"{counted(len(paths), 'path')}{fewer} from {_shown(begin.place)} to {_shown(goal)}: "
         f"{num_classes}, {lengths.min():.1f} to {lengths.max():.1f} m"
     )
     with reporter.stage("factors"):
@@ -247,7 +248,3 @@ def more_candidates_hint(decision: Decision, rule: CandidateRule, *, along_traje
 
 def _shown(place: Sequence[float] | FloatArray) -> str:
     return f"({place[0]:.2f}, {place[1]:.2f})"
-
-
-def _counted(count: int, noun: str, plural: str = "") -> str:
-    return f"{count} {noun if count == 1 else plural or noun + 's'}"
