@@ -33,6 +33,7 @@ from .io.toro import read_toro as read_toro
 from .planning.decision import Decision as Decision
 from .planning.decision_quality import DecisionQuality as DecisionQuality
 from .planning.decision_quality import decision_quality as decision_quality
+from .planning.drawn_closures import drawn_values as drawn_values
 from .planning.planner import Planner as Planner
 from .signatures.spanning_trees import log_num_spanning_trees as log_num_spanning_trees
 from .signatures.spanning_trees import spanning_tree_signature as spanning_tree_signature
