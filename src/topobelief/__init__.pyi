@@ -1,6 +1,8 @@
 from .bounds.entropy_bounds import Bounds as Bounds
 from .bounds.entropy_bounds import entropy_bounds as entropy_bounds
+from .candidates.closures import ClosureModel as ClosureModel
 from .candidates.diverse_paths import diverse_paths as diverse_paths
+from .candidates.learned_closures import learn_closures as learn_closures
 from .candidates.polyline import path_poses as path_poses
 from .candidates.predicted_factors import default_information as default_information
 from .candidates.predicted_factors import predict_actions as predict_actions
@@ -33,6 +35,7 @@ from .io.toro import read_toro as read_toro
 from .planning.decision import Decision as Decision
 from .planning.decision_quality import DecisionQuality as DecisionQuality
 from .planning.decision_quality import decision_quality as decision_quality
+from .planning.drawn_closures import drawn_values as drawn_values
 from .planning.planner import Planner as Planner
 from .report.drawing import draw_bounds as draw_bounds
 from .report.drawing import draw_graph as draw_graph
