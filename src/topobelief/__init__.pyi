@@ -37,6 +37,8 @@ from .planning.decision_quality import DecisionQuality as DecisionQuality
 from .planning.decision_quality import decision_quality as decision_quality
 from .planning.drawn_closures import drawn_values as drawn_values
 from .planning.planner import Planner as Planner
+from .position_errors import ExpectedErrors as ExpectedErrors
+from .position_errors import expected_errors as expected_errors
 from .report.drawing import draw_bounds as draw_bounds
 from .report.drawing import draw_graph as draw_graph
 from .report.drawing import draw_paths as draw_paths
