@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from topobelief.io.gtsam import to_gtsam
 
 from data_files import RECORDED, data_file
 from graphs import SE2_GROUP, SE3_GROUP, Noise, pose_graphs, random_pose_graph, relabelled, sessions
@@ -19,7 +20,6 @@ from topobelief.graph.action import posterior
 from topobelief.graph.information import block_isotropic
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.g2o import read_g2o
-from topobelief.io.gtsam import to_gtsam
 from topobelief.position_errors import expected_errors
 
 MODERATE = {"log_ratio": (-2.0, 1.0)}
