@@ -166,6 +166,7 @@ def test_no_scheduler_and_no_worker(make_tasks, tmp_path, start, monkeypatch):
     monkeypatch.setattr(cluster, "_PATIENCE", 2)
     with pytest.raises(InvalidInputError, match=r"expected a dask scheduler at tcp://127\.0\.0\.1:9, got no answer"):
         run_study(make_tasks(), tmp_path / "out", Cluster("tcp://127.0.0.1:9"))
+    monkeypatch.setattr(cluster, "_PATIENCE", 10)
     address = start(num_workers=0).address
     with pytest.raises(InvalidInputError, match="expected a worker at the scheduler"):
         run_study(make_tasks(), tmp_path / "out", Cluster(address))
