@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from dataclasses import replace
 
@@ -66,11 +65,11 @@ def test_closures_are_predicted_as_the_front_end_makes_them(physical):
     rule = FrontEndSettings().expected_closures
     for deliberation in (first, second):
         model = learn_closures(deliberation.prior, world=physical.scenario.world, rule=rule)
-        for action, path in zip(deliberation.actions, deliberation.paths, strict=True):
+        for action in deliberation.actions:
             if action.probabilities is not None:
                 assert action.probabilities[-1] == pytest.approx(model.probability)
-            corners = np.abs(np.diff(np.unwrap(np.arctan2(*np.diff(path, axis=0).T[::-1])))) > math.radians(15)
-            assert action.num_new_poses >= math.ceil(action.length) + corners.any()
+            turns = np.diff(np.unwrap(action.poses[:, 2]))
+            assert np.abs(turns).max(initial=0.0) <= FrontEndSettings().key_pose_angle * (1 + 1e-6)
     assert any(action.num_closures for action in second.actions)
 
 
