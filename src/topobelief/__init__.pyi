@@ -24,6 +24,8 @@ from .io.g2o import read_g2o as read_g2o
 from .io.g2o import write_g2o as write_g2o
 from .io.gtsam import from_gtsam as from_gtsam
 from .io.gtsam import to_gtsam as to_gtsam
+from .io.path_formats import read_path as read_path
+from .io.path_formats import write_path as write_path
 from .io.reading import ReadingOptions as ReadingOptions
 from .io.ros_map import read_ros_map as read_ros_map
 from .io.ros_map import write_ros_map as write_ros_map
