@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
-
 from topobelief.candidates.closures import ClosureModel
 from topobelief.candidates.learned_closures import learn_closures
 from topobelief.candidates.propose import CandidateRule
 from topobelief.cli.console import Reporter
+from topobelief.cli.plan_options import Closures
 from topobelief.errors import InvalidInputError
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.world import World
-
-Closures = Literal["learned", "paper", "by-hand"]
 
 
 def stated_closures(
