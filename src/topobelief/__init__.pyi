@@ -40,4 +40,5 @@ from .signatures.spanning_trees import log_num_spanning_trees as log_num_spannin
 from .signatures.spanning_trees import spanning_tree_signature as spanning_tree_signature
 from .signatures.von_neumann import von_neumann_entropy as von_neumann_entropy
 from .signatures.von_neumann import von_neumann_entropy_approx as von_neumann_entropy_approx
+from .version import __version__ as __version__
 from .world.world import World as World

@@ -2,6 +2,10 @@
 
 import json
 import math
+import re
+import sys
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,8 +16,12 @@ from graphs import path, sessions
 from topobelief.errors import InvalidInputError
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
+from topobelief.objectives.objective import Objective
+from topobelief.planning import registry
 from topobelief.planning.decision import SCHEMA, Decision
+from topobelief.planning.decision_table import decision_table
 from topobelief.planning.planner import Planner
+from topobelief.report.bounds_figure import draw_bounds
 
 OMEGA = np.diag([100.0, 100.0, 400.0])
 LINE = PoseGraph([[i, 0, 0] for i in range(5)], path(5).edges, None, OMEGA)
@@ -92,25 +100,70 @@ def test_what_is_not_a_decision_is_refused(change, message):
 def test_the_table_has_a_line_per_action_in_ranking_order():
     decision = Planner(LINE).decide([EXPLORE, REVISIT])
     lines = str(decision).splitlines()
-    assert lines[1] == ""
-    assert lines[2].split() == [
-        "rank",
-        "action",
-        "signature",
-        "lower",
-        "upper",
-        "exact",
-        "poses",
-        "closures",
-        "length",
-        "survives",
-    ]
-    assert len(lines) == 5
-    for line, index in zip(lines[3:], decision.ranking, strict=True):
+    assert lines[:2] == [decision.summary(), ""]
+    assert lines[2].split() == ["#", "action", "signature", "lower", "upper", "cost", "poses", "closures", "metres", "best"]
+    for line, index in zip(lines[3:5], decision.ranking, strict=True):
         assert decision.name(index) in line
         assert f"{decision.signatures[index]:.2f}" in line
-    assert lines[3].split()[-1] == "best"
-    assert " - " in lines[3]  # nothing evaluated
+    assert lines[3].endswith("yes")
+    assert lines[6] == "lower, upper: bounds of the joint entropy plus cost in nats; the less, the better."
+
+
+def test_text_and_html_show_the_same_cells():
+    decision = Planner(LINE).decide([EXPLORE, REVISIT], proof="optimal")
+    table, html = decision_table(decision), decision._repr_html_()
+    for row in table.rows:
+        cells = re.findall(r">([^<]*)</td>", next(line for line in html.splitlines() if f">{row.cells[1]}<" in line))
+        assert tuple(cells) == row.cells
+        assert any(all(cell in line for cell in row.cells) for line in str(decision).splitlines())
+    assert f"<p>{decision.summary()}</p>" in html
+
+
+def test_labels_are_text_in_html_too():
+    decision = Planner(LINE).decide([Action([[5, 0, 0]], [(4, 5)], OMEGA, label="<b>")])
+    assert "&lt;b&gt;" in decision._repr_html_()
+    assert "<b>" not in decision._repr_html_()
+
+
+@pytest.mark.parametrize(
+    ("limit", "text"),
+    [
+        ({"proof": "none"}, r"Decision\(action 1 of 2, without bounds\)"),
+        ({}, r"Decision\(action 1 of 2, at most [\d.]+ nats from the best\)"),
+        ({"proof": "optimal"}, r"Decision\(action 1 of 2, proven optimal\)"),
+    ],
+)
+def test_a_decision_describes_itself_in_one_line(limit, text):
+    actions = [EXPLORE, REVISIT] if "proof" in limit else [REVISIT, REVISIT]
+    description = repr(Planner(LINE, objective="map").decide(actions, **limit))
+    assert re.fullmatch(text.replace("action 1", r"action \d"), description), description
+
+
+class _InMetres(Objective):
+    quantity, description, unit = "expected error", "expected error of the map after the action", "m"
+    of = trees = lambda *_: 1 / 0
+
+
+def test_metres_are_shown_in_centimetres_everywhere(monkeypatch):
+    monkeypatch.setitem(registry.OBJECTIVES, "error", f"{__name__}:OBJECTIVE")
+    monkeypatch.setitem(sys.modules, __name__, SimpleNamespace(OBJECTIVE=_InMetres()))
+    decision = replace(
+        Planner(LINE).decide([EXPLORE, REVISIT]),
+        objective="error",
+        lower=[0.084, 0.12],
+        upper=[0.1, 0.19],
+        error_bound=0.035,
+        proven_optimal=False,
+    )
+    assert "by more than 3.5 cm;" in decision.summary()
+    assert repr(decision).endswith("at most 3.5 cm from the best)")
+    for shown in (str(decision), decision._repr_html_()):
+        assert "8.40" in shown
+        assert "19.00" in shown
+        assert "expected error plus cost in cm" in shown
+    axes = draw_bounds(decision).axes[0]
+    assert axes.get_xlabel() == "expected error of the map after the action, plus cost (cm)"
+    assert max(max(line.get_xdata()) for line in axes.lines if line.get_linewidth() == 5) == pytest.approx(19)
 
 
 @pytest.mark.parametrize(

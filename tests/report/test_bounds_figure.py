@@ -51,7 +51,7 @@ def test_exact_values_have_their_cost_added_as_the_bounds_have(make_decision):
     decision = make_decision(3, cost=4.0)
     figure = draw_bounds(decision, entropies=[-100.0, -110.0, -120.0])
     assert marks(figure, "white").tolist() == [[-116.0, 0], [-106.0, 1], [-96.0, 2]]
-    assert figure.axes[0].get_xlabel().endswith(", plus cost")
+    assert figure.axes[0].get_xlabel().endswith(", plus cost (nats)")
 
 
 def test_values_that_the_decision_needed_are_told_from_those_that_it_did_not(make_decision):

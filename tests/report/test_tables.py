@@ -5,11 +5,10 @@ from __future__ import annotations
 import io
 
 import numpy as np
-import pytest
 from rich.console import Console
 from rich.table import Table
 
-from topobelief.report.tables import candidate_table, number, quantity_table
+from topobelief.report.tables import candidate_table, quantity_table
 
 
 def printed(table: Table, width: int = 200) -> str:
@@ -48,11 +47,6 @@ def test_labels_are_text_and_not_markup(make_decision):
 def test_the_table_fits_a_terminal_of_80_columns(make_decision):
     wide = make_decision(20, lower=np.full(20, -39774.36), upper=np.full(20, -37426.12))
     assert "…" not in printed(candidate_table(wide), width=80)
-
-
-@pytest.mark.parametrize(("value", "text"), [(1.005, "1.00"), (-2.0, "-2.00"), (float("nan"), "–")])
-def test_numbers_have_two_decimals_and_nan_is_a_dash(value, text):
-    assert number(value) == text
 
 
 def test_quantities_stand_beside_their_names():

@@ -27,6 +27,9 @@ class Bounds:
     lower: float
     upper: float
 
+    def __repr__(self) -> str:
+        return f"Bounds({self.lower:.2f} to {self.upper:.2f} nats)"
+
 
 def entropy_bounds(
     graph: PoseGraph, *, family: Family = "fischer", determinant: Determinant = "cholesky", anchor: int = 0

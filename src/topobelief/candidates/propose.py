@@ -22,6 +22,7 @@ from topobelief.candidates.roadmap import Roadmap, build_roadmap
 from topobelief.candidates.start import Start
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
+from topobelief.wording import counted
 from topobelief.world import World
 
 
@@ -80,6 +81,9 @@ class Routes:
     roadmap: Roadmap
     paths: list[FloatArray]
 
+    def __repr__(self) -> str:
+        return f"Routes({_described(self.lengths)})"
+
     @property
     def lengths(self) -> FloatArray:
         """Of the paths, metres, shape (K,)."""
@@ -100,6 +104,9 @@ class Candidates:
     routes: Routes
     actions: list[Action]
 
+    def __repr__(self) -> str:
+        return f"Candidates({_described(self.lengths)})"
+
     @property
     def paths(self) -> list[FloatArray]:
         """K polylines, each of shape (waypoints, 2), metres, shortest first."""
@@ -109,6 +116,13 @@ class Candidates:
     def lengths(self) -> FloatArray:
         """Of the paths, metres, shape (K,)."""
         return self.routes.lengths
+
+
+def _described(lengths: FloatArray) -> str:
+    """How many paths, and of which lengths."""
+    ends = dict.fromkeys(f"{length:.1f}" for length in (lengths.min(), lengths.max())) if len(lengths) else {}
+    extent = f", {' to '.join(ends)} m" if ends else ""
+    return f"{counted(len(lengths), 'path')}{extent}"
 
 
 def propose(graph: PoseGraph, world: World, start: ArrayLike | Start, goal: ArrayLike, rule: CandidateRule) -> Candidates:

@@ -29,6 +29,7 @@ from topobelief.arrays import BoolArray, FloatArray, IntArray, frozen_floats
 from topobelief.candidates.corners import Corners, find_corners, tangents
 from topobelief.candidates.passages import find_passages
 from topobelief.errors import InvalidInputError, InvalidMapError, PlanningError
+from topobelief.wording import counted
 from topobelief.world import World, shapes
 from topobelief.world.free_places import nearest_free_place
 
@@ -64,6 +65,10 @@ class Roadmap:
     region: Polygon
     vertices: FloatArray
     edges: IntArray
+
+    def __repr__(self) -> str:
+        vertices, edges = counted(len(self.vertices), "vertex", "vertices"), counted(len(self.edges), "edge")
+        return f"Roadmap({vertices}, {edges}, robot radius {self.robot_radius:g} m)"
 
     @cached_property
     def lengths(self) -> FloatArray:

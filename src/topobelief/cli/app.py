@@ -45,9 +45,9 @@ def _topobelief(  # pyright: ignore[reportUnusedFunction]  (typer calls it)
     Ranks paths by the topology of the graph that they leave, with bounds on what that can cost.
     """
     if show_version:
-        from importlib.metadata import version  # slow to load
+        from topobelief.version import __version__  # slow to load
 
-        typer.echo(f"topobelief {version('topobelief')}")
+        typer.echo(f"topobelief {__version__}")
     elif context.invoked_subcommand is None:
         typer.echo(context.get_help())
 

@@ -23,6 +23,7 @@ from topobelief.errors import FileError, PlanningError
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.path_formats import read_filed_path
+from topobelief.wording import counted
 from topobelief.world import World
 
 _ARRIVED = 0.1  # metres; a path from a file that ends within this of a goal leads there
@@ -115,10 +116,10 @@ def _described(routes: Routes, begin: Start, goal: Goal, rule: CandidateRule) ->
     paths, lengths = routes.paths, routes.lengths
     classes = count_classes(routes.roadmap, paths)
     at_least = "" if classes.is_exact else "at least "
-    num_classes = at_least + _counted(classes.number, "homotopy class", "homotopy classes")
+    num_classes = at_least + counted(classes.number, "homotopy class", "homotopy classes")
     fewer = f" of {rule.num_paths} asked for" if len(paths) < rule.num_paths else ""
     return (
-        f"{_counted(len(paths), 'path')}{fewer} from {shown(begin.place)} to {goal.name}: "
+        f"{counted(len(paths), 'path')}{fewer} from {shown(begin.place)} to {goal.name}: "
         f"{num_classes}, {lengths.min():.1f} to {lengths.max():.1f} m"
     )
 
@@ -155,7 +156,3 @@ def _first_blocked(world: World, a: FloatArray, b: FloatArray, robot_radius: flo
     places = a + np.linspace(0, 1, min(count, 10_000))[:, None] * (b - a)
     tight = np.flatnonzero(world.clearance(places) <= robot_radius)
     return places[tight[0] if tight.size else -1]
-
-
-def _counted(count: int, noun: str, plural: str = "") -> str:
-    return f"{count} {noun if count == 1 else plural or noun + 's'}"

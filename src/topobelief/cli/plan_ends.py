@@ -73,7 +73,9 @@ def choose_goals(graph: PoseGraph, given: Sequence[GivenPlace]) -> list[Goal]:
             goals.append(Goal(np.array(each.place), shown(each.place)))
         for earlier in goals[:-1]:
             if (earlier.place == goals[-1].place).all():
-                raise InvalidInputError(f"expected different goals, got {earlier.name} and {goals[-1].name}, which are one place")
+                raise InvalidInputError(
+                    f"expected different goals, got {earlier.name} and {goals[-1].name}, which are one place"
+                )
     return goals
 
 

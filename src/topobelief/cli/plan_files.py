@@ -7,7 +7,6 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import cast
 
@@ -27,6 +26,7 @@ from topobelief.io.files import atomic_file
 from topobelief.io.json_values import without_nan
 from topobelief.io.path_formats import path_text, require_path_suffix
 from topobelief.planning.decision import Decision
+from topobelief.version import __version__
 from topobelief.world import World
 
 
@@ -105,7 +105,7 @@ def document(result: PlanResult) -> dict[str, object]:
             "x_y_yaw": path_poses(best).tolist(),
         },
         "notes": list(result.notes),
-        "topobelief": version("topobelief"),
+        "topobelief": __version__,
         "graph": {"num_poses": graph.num_poses, "num_edges": graph.num_edges, "chi2": graph.chi2},
         "start": (start.place if start.distance(graph) else graph.poses[start.pose]).tolist(),
         "start_pose": {"index": start.pose, "id": int(graph.ids[start.pose])},
@@ -125,27 +125,25 @@ def _plain(value: object) -> object:
 
 def write(folder: Path | None, path_file: Path | None, result: PlanResult, reporter: Reporter) -> None:
     """Draw and write what is wanted, all of it or nothing; say where it is and how long all took."""
-    writers: dict[Path, Callable[[Path], object]] = {}
+    writers: dict[str, Callable[[Path], object]] = {}
     if path_file is not None:
-        poses = path_poses(result.proposals.paths[result.decision.best])
-        writers[path_file] = _writer(path_text(path_file, poses))
+        text = path_text(path_file, path_poses(result.proposals.paths[result.decision.best]))
+        writers[str(path_file.absolute())] = _writer(text)
     if folder is not None:
-        _make(folder)
-        text = json.dumps(document(result), indent=2, allow_nan=False) + "\n"
-        writers[folder / "decision.json"] = _writer(text)
+        writers["decision.json"] = _writer(json.dumps(document(result), indent=2, allow_nan=False) + "\n")
         with reporter.stage("pictures"):
             try:
-                writers |= {folder / name: write_to for name, write_to in _pictures(result).items()}
+                writers |= _pictures(result)
             finally:  # a picture that fails does not cost the decision
-                write_together(writers)
+                write_together(folder, writers)
         reporter.say(
             "",
             f"Pictures: {folder / 'paths.png'} and {folder / 'bounds.png'}; decision: {folder / 'decision.json'}",
         )
-    else:
-        write_together(writers)
+    elif path_file is not None:
+        write_together(path_file.absolute().parent, writers)
     if path_file is not None:
-        reporter.say(f"The path, with a heading at every pose: {path_file}")
+        reporter.say(f"Chosen path, with a heading at every pose: {path_file}")
     if writers:
         reporter.say(f"Took {reporter.time_taken()}")
 
@@ -167,28 +165,32 @@ def _pictures(result: PlanResult) -> dict[str, Callable[[Path], object]]:
         found.paths,
         found.actions,
         decision,
-        goals=[goal.place for goal in result.goals],
+        goal=result.goals[0].place,
         start=result.start,
     )
     bounds = draw_bounds(decision, result.entropies)
     return {"paths.png": lambda path: save_figure(paths, path), "bounds.png": lambda path: save_figure(bounds, path)}
 
 
-def _make(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FileError(folder, f"expected a folder to write to, got: {error.strerror}") from None
-
-
-def write_together(writers: Mapping[Path, Callable[[Path], object]]) -> None:
+def write_together(folder: Path, writers: Mapping[str, Callable[[Path], object]]) -> None:
     """Write files beside their places first; they take their names once all are complete.
+
+    Parameters
+    ----------
+    folder
+        Made where it is missing.
+    writers
+        What writes each, by its name in the folder, or by its whole path for one elsewhere.
 
     Raises
     ------
     FileError
-        If a file cannot be written.
+        If the folder cannot be made or a file not be written.
     """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(folder, f"expected a folder to write to, got: {error.strerror}") from None
     with ExitStack() as stack:
-        for target, write_to in writers.items():
-            write_to(stack.enter_context(atomic_file(target)))
+        for name, write_to in writers.items():
+            write_to(stack.enter_context(atomic_file(folder / name)))

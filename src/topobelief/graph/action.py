@@ -17,6 +17,7 @@ from topobelief.errors import InvalidActionError, InvalidInputError
 from topobelief.graph.information import checked_information
 from topobelief.graph.pose_graph import PoseGraph, checked_pose_rows
 from topobelief.graph.topology import Topology
+from topobelief.wording import counted
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -103,6 +104,11 @@ class Action(ReadOnlyArrays):
             ("probabilities", chances),
         ):
             object.__setattr__(self, name, value)
+
+    def __repr__(self) -> str:
+        label = f"{self.label!r}, " if self.label else ""
+        cost = f", cost {self.cost:g}" if self.cost else ""
+        return f"Action({label}{counted(self.num_new_poses, 'new pose')}, {counted(len(self.edges), 'edge')}{cost})"
 
     @property
     def num_new_poses(self) -> int:

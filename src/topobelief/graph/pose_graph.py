@@ -18,6 +18,7 @@ from topobelief.errors import InvalidGraphError
 from topobelief.geometry import Group, group_of_size
 from topobelief.graph.information import checked_information
 from topobelief.graph.topology import Topology
+from topobelief.wording import counted
 
 _LARGEST_ID_JUMP = 100  # times the usual step of ids: what lies further on is a tag, a landmark or another robot
 
@@ -124,6 +125,9 @@ class PoseGraph(ReadOnlyArrays):
         for name, value in (fields | {"information": information, "ids": ids, "fixed": fixed}).items():
             object.__setattr__(graph, name, read_only(value) if isinstance(value, np.ndarray) else value)
         return graph
+
+    def __repr__(self) -> str:
+        return f"PoseGraph({self.group.name}, {counted(self.num_poses, 'pose')}, {counted(self.num_edges, 'edge')})"
 
     @property
     def num_poses(self) -> int:

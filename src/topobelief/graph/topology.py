@@ -16,6 +16,7 @@ from scipy.sparse.csgraph import connected_components
 
 from topobelief.arrays import FloatArray, IntArray, ReadOnlyArrays, frozen_floats, frozen_ints, read_only
 from topobelief.errors import DisconnectedGraphError, InvalidGraphError
+from topobelief.wording import counted
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -66,6 +67,9 @@ class Topology(ReadOnlyArrays):
             )
         object.__setattr__(self, "num_nodes", int(num_nodes))
         object.__setattr__(self, "edges", checked)
+
+    def __repr__(self) -> str:
+        return f"Topology({counted(self.num_nodes, 'node')}, {counted(self.num_edges, 'edge')})"
 
     @property
     def num_edges(self) -> int:

@@ -39,9 +39,9 @@ def path_of_quaternions(path: StrPath, rows: Sequence[Sequence[float]], lines: S
     lengths = np.linalg.norm(numbers[:, 2:], axis=1)
     bad = np.flatnonzero(~(np.abs(lengths - 1) <= _UNIT_TOLERANCE))
     if bad.size:
-        length = lengths[bad[0]]
+        first, length = int(bad[0]), float(lengths[bad[0]])
         advice = "; give 0 0 0 1 where the heading does not matter" if length == 0 else ""
-        raise FileError(path, f"expected a quaternion of length 1, got one of {length:.4g}{advice}", line=lines[bad[0]])
+        raise FileError(path, f"expected a quaternion of length 1, got one of {length:.4g}{advice}", line=lines[first])
     headings = headings_of_quaternions(numbers[:, 2:] / lengths[:, None])
     return FiledPath(np.column_stack([numbers[:, :2], headings]), tuple(lines))
 

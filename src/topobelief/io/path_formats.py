@@ -72,8 +72,8 @@ def write_path(path: StrPath, poses: ArrayLike) -> None:
     ----------
     path
     poses : shape (N, 3)
-        x and y in metres, yaw in radians; `path_poses` gives them. In TUM the times count poses; a nav_msgs/Path has stamps of 0
-        and the frame "map".
+        x and y in metres, yaw in radians; `path_poses` gives them. In TUM the times count poses; a nav_msgs/Path has stamps of
+        0 and the frame "map".
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Paths in CSV: one pose a line, `x,y` or `x,y,yaw`, in metres and radians; a header of these names and # comments may be there."""
+"""Paths in CSV: a pose a line, `x,y` or `x,y,yaw`, metres and radians, with or without these names as header; # comments."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Literal, NamedTuple, TypedDict, get_args
 
 from topobelief.errors import InvalidInputError, ReadingWarning, require_choice
@@ -59,6 +59,12 @@ class ReadingOptions:
     edge2_order: Edge2Order = "toro"
     component: int | str = "all"
     planar: bool = False
+
+    def __repr__(self) -> str:
+        """Only what differs from the defaults; words to drop in alphabetical order."""
+        values = {field.name: (getattr(self, field.name), field.default) for field in fields(self)}
+        values["drop"] = (sorted(self.drop), [])
+        return f"ReadingOptions({', '.join(f'{name}={value!r}' for name, (value, usual) in values.items() if value != usual)})"
 
     def __post_init__(self) -> None:
         words = (self.drop,) if isinstance(self.drop, str) else tuple(self.drop)

@@ -12,6 +12,9 @@ from topobelief.signatures.spanning_trees import joint_signature
 class JointEntropy(Objective):
     """J = (n - 1) kappa / 2 ln(2 pi e) - 1/2 ln det I, n the poses after the action, kappa the tangent dimension; nats."""
 
+    quantity = "joint entropy"
+    description = "joint entropy of all poses after the action"
+
     def of(self, log_det: Estimate[Number], forms: Forms[Number]) -> Estimate[Number]:
         return entropy_of(log_det, forms.num_free, forms.tangent_dim)
 

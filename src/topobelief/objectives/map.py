@@ -15,6 +15,9 @@ class MapEntropy(Objective):
     n_0 are the poses before the action, I_nn the block of the new ones with the prior held fixed, which is exact.
     """
 
+    quantity = "map entropy"
+    description = "entropy of the poses that exist now, after the action"
+
     def of(self, log_det: Estimate[Number], forms: Forms[Number]) -> Estimate[Number]:
         gain = log_det - forms.log_det("joint", part="new")
         return entropy_of(gain, forms.num_free - forms.num_new, forms.tangent_dim)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from typing import ClassVar
 
 from topobelief.bounds.options import BoundOptions
 from topobelief.forms.protocol import Forms, TreeForms
@@ -18,6 +19,13 @@ class Objective(ABC):
 
     Entropies are decreasing functions of ln det I with the rest exact, so bounds of ln det I bound them.
     """
+
+    quantity: ClassVar[str]
+    """What it is, in a sentence and a table."""
+    description: ClassVar[str]
+    """What it is, where there is room."""
+    unit: ClassVar[str] = "nats"
+    """Of the objective, its bounds and costs; `topobelief.planning.units` says how numbers of a unit are shown."""
 
     @abstractmethod
     def of(self, log_det: Estimate[Number], forms: Forms[Number]) -> Estimate[Number]:

@@ -11,6 +11,10 @@ from topobelief.objectives.objective import Objective
 class EntropyPerPose(Objective):
     """J / (n - 1), n the poses after the action; nats per pose."""
 
+    quantity = "joint entropy per pose"
+    description = "joint entropy per pose after the action"
+    unit = "nats per pose"
+
     def of(self, log_det: Estimate[Number], forms: Forms[Number]) -> Estimate[Number]:
         return _per_pose(joint.OBJECTIVE.of(log_det, forms), forms)
 

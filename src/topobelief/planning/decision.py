@@ -12,6 +12,9 @@ import numpy as np
 from topobelief.arrays import FloatArray, IntArray, ReadOnlyArrays, frozen_floats, frozen_ints
 from topobelief.errors import InvalidInputError
 from topobelief.io.json_values import without_nan
+from topobelief.planning.decision_table import as_html, as_text, decision_table
+from topobelief.planning.registry import OBJECTIVES, chosen
+from topobelief.planning.units import quantity, shown_factor, shown_unit
 
 SCHEMA = "topobelief.decision/2"
 
@@ -33,7 +36,7 @@ class Candidate:
     cost: float  # nats
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Decision(ReadOnlyArrays):
     """The outcome of `Planner.decide` over K actions.
 
@@ -53,7 +56,7 @@ class Decision(ReadOnlyArrays):
     survivors : shape (number of survivors,), int
         Actions that may still be optimal, in ranking order; the first of the ranking is always among them.
     error_bound : float
-        No action is better than the best by more than this, nats; inf where no bounds were asked for.
+        No action is better than the best by more than this, in the unit; inf where no bounds were asked for.
     margin_met : bool or None
         Whether the upper bound of the best lies below the margin; None where no margin was given.
     num_evaluations : int
@@ -92,6 +95,21 @@ class Decision(ReadOnlyArrays):
         """K."""
         return len(self.candidates)
 
+    @property
+    def unit(self) -> str:
+        """Of the objective, its bounds, costs and `error_bound`: "nats", "nats per pose" or "m"."""
+        return chosen(OBJECTIVES, self.objective).unit
+
+    @property
+    def quantity(self) -> str:
+        """What is minimised, in words: "map entropy"."""
+        return chosen(OBJECTIVES, self.objective).quantity
+
+    @property
+    def description(self) -> str:
+        """What is minimised, where there is room: "entropy of the poses that exist now, after the action"."""
+        return chosen(OBJECTIVES, self.objective).description
+
     def name(self, action: int) -> str:
         """What to call an action: its label, else its index."""
         return self.candidates[action].label or f"action {action}"
@@ -106,15 +124,13 @@ class Decision(ReadOnlyArrays):
             f"{first[:1].upper()}{first[1:]}{of_total} ({candidate.length:.1f} m, {poses}"
             f"{candidate.num_closures} loop closures) {self._claim()}"
         ]
-        unit = " per pose" if self.objective == "per_pose" else ""
         ruled_out = total - len(self.survivors)
         if self.margin_met is not None:
-            sentences.append(
-                f"Its upper bound, {self.upper[self.best]:.1f} nats, {'is below' if self.margin_met else 'misses'} the margin."
-            )
+            upper = f"{self.upper[self.best] * shown_factor(self.unit):.1f} {shown_unit(self.unit)}"
+            sentences.append(f"Its upper bound, {upper}, {'is below' if self.margin_met else 'misses'} the margin.")
         elif not self.proven_optimal and math.isfinite(self.error_bound):
             sentences.append(
-                f"No candidate can be better by more than {_readable(self.error_bound)} nats{unit}; "
+                f"No candidate can be better by more than {quantity(self.error_bound, self.unit)}; "
                 f"{ruled_out} {'was' if ruled_out == 1 else 'were'} ruled out by bounds."
             )
         elif self.proven_optimal and total > 1:
@@ -129,33 +145,24 @@ class Decision(ReadOnlyArrays):
             return "is the only candidate: there is nothing to choose from."
         by = _SIGNATURE_NAMES.get(self.signature, self.signature)
         if self.proven_optimal:
-            return f"is optimal ({self.objective} entropy)."
+            return f"is optimal ({self.quantity})."
         if self.num_evaluations:
-            return f"has the least {self.objective} entropy of the {self.num_evaluations} evaluated."
+            return f"has the least {self.quantity} of the {self.num_evaluations} evaluated."
         return f"is the best by {by}."
 
+    def __repr__(self) -> str:
+        """The choice and what is known of it; `str` is the table."""
+        if self.proven_optimal or math.isinf(self.error_bound):
+            known = "proven optimal" if self.proven_optimal else "without bounds"
+        else:
+            known = f"at most {quantity(self.error_bound, self.unit)} from the best"
+        return f"Decision({self.name(self.best)} of {self.num_actions}, {known})"
+
     def __str__(self) -> str:
-        header = ("rank", "action", "signature", "lower", "upper", "exact", "poses", "closures", "length", "survives")
-        surviving = set(self.survivors.tolist())
-        rows: list[tuple[str, ...]] = [header]
-        ranking: list[int] = self.ranking.tolist()
-        for rank, action in enumerate(ranking, start=1):
-            c = self.candidates[action]
-            numbers = (self.signatures[action], self.lower[action], self.upper[action], self.entropies[action])
-            rows.append(
-                (
-                    str(rank),
-                    self.name(action),
-                    *("-" if math.isnan(value) else f"{value:.2f}" for value in numbers),
-                    str(c.num_new_poses),
-                    str(c.num_closures),
-                    f"{c.length:.1f}",
-                    "best" if action == self.best else "yes" if action in surviving else "no",
-                )
-            )
-        widths = [max(len(row[column]) for row in rows) for column in range(len(header))]
-        lines = ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in rows]
-        return "\n".join([self.summary(), "", *lines])
+        return f"{self.summary()}\n\n{as_text(decision_table(self))}"
+
+    def _repr_html_(self) -> str:
+        return as_html(decision_table(self), self.summary())
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON. What is not known (nan, or an infinite bound) is None; actions come by index."""
@@ -234,11 +241,6 @@ class Decision(ReadOnlyArrays):
             raise InvalidInputError(f"expected a decision with the field {error}, got none") from None
         except (TypeError, ValueError) as error:
             raise InvalidInputError(f"expected a decision as to_dict writes it, got one with a bad value: {error}") from None
-
-
-def _readable(nats: float) -> str:
-    """Two digits below ten, whole nats above a hundred."""
-    return f"{nats:.0f}" if nats >= 100 else f"{nats:.1f}" if nats >= 1 else f"{nats:.2g}"
 
 
 def _from_json(value: float | None, *, unknown: float) -> float:

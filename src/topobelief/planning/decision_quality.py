@@ -47,6 +47,10 @@ class DecisionQuality:
     kendall: float
     pearson: float
 
+    def __repr__(self) -> str:
+        correlations = f"Spearman {self.spearman:.3g}, Kendall {self.kendall:.3g}, Pearson {self.pearson:.3g}"
+        return f"DecisionQuality(error {self.error:.3g} nats, gamma {self.gamma:.3g} nats, {correlations})"
+
 
 def decision_quality(entropies: ArrayLike, signatures: ArrayLike) -> DecisionQuality:
     """Compare a signature with the entropies that it stands for.

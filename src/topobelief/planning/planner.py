@@ -127,6 +127,10 @@ class Planner:
         self._graph, self._anchor = graph, self._checked(graph)
         warn_of_misfit(graph)
 
+    def __repr__(self) -> str:
+        c = self._criteria
+        return f"Planner({self._graph!r}, objective {c.objective!r}, signature {c.signature!r}, bounds {c.bounds!r})"
+
     def __getstate__(self) -> dict[str, Any]:
         return {**vars(self), "_engines": {}}
 

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from topobelief.arrays import FloatArray
 from topobelief.planning.decision import Decision
+from topobelief.planning.units import quantity, shown_factor, shown_unit
 from topobelief.report import style
 from topobelief.report.canvas import Align, Canvas, Entry, Panel
 
@@ -31,11 +32,6 @@ _COLUMNS: tuple[tuple[str, float, Align], ...] = (
     ("closures", 2.78, "right"),
 )
 _NAME_COLUMN = 11  # characters that fit it
-_OBJECTIVES = {
-    "joint": "joint entropy of all poses after the action (nats)",
-    "map": "entropy of the poses that exist now, after the action (nats)",
-    "per_pose": "joint entropy per pose after the action (nats)",
-}
 
 
 def draw_bounds(decision: Decision, entropies: ArrayLike | None = None) -> Figure:
@@ -53,18 +49,11 @@ def draw_bounds(decision: Decision, entropies: ArrayLike | None = None) -> Figur
     Figure
         `topobelief.report.canvas.save_figure` writes it.
     """
-    exact = decision.entropies if entropies is None else np.asarray(entropies, dtype=np.float64)
-    costs = np.array([candidate.cost for candidate in decision.candidates])
     rows = decision.num_actions
     with style.style():
         canvas = Canvas(_WIDTH, _TOP + _BOTTOM + _ROW * rows)
         panel = canvas.panel(_PLOT_LEFT, _BOTTOM, _WIDTH - _PLOT_LEFT - _PLOT_RIGHT, _ROW * rows)
-        key = _draw_intervals(panel, decision)
-        key += _draw_exact(panel, decision, exact + costs)
-        key += _draw_threshold(panel, decision)
-        panel.axes.set_ylim(rows - 0.5, -0.5)
-        panel.axes.margins(x=0.03)
-        panel.value_axis(_OBJECTIVES[decision.objective] + (", plus cost" if costs.any() else ""))
+        key = draw_rows(panel, decision, entropies)
         _write_columns(canvas, decision)
         canvas.title(_MARGIN, canvas.height - 0.50, _title(decision), _subtitle(decision))
         if key:
@@ -72,8 +61,22 @@ def draw_bounds(decision: Decision, entropies: ArrayLike | None = None) -> Figur
     return canvas.figure
 
 
+def draw_rows(panel: Panel, decision: Decision, entropies: ArrayLike | None = None) -> list[Entry]:
+    """The plot alone: a row an action, the first of the ranking above; returns the key. Arguments as for `draw_bounds`."""
+    exact = decision.entropies if entropies is None else np.asarray(entropies, dtype=np.float64)
+    costs = np.array([candidate.cost for candidate in decision.candidates])
+    key = _draw_intervals(panel, decision)
+    key += _draw_exact(panel, decision, exact + costs)
+    key += _draw_threshold(panel, decision)
+    panel.axes.set_ylim(decision.num_actions - 0.5, -0.5)
+    panel.axes.margins(x=0.03)
+    plus_cost = ", plus cost" if costs.any() else ""
+    panel.value_axis(f"{decision.description}{plus_cost} ({shown_unit(decision.unit)})")
+    return key
+
+
 def _draw_intervals(panel: Panel, decision: Decision) -> list[Entry]:
-    colours = style.standing_colours(decision)
+    colours, factor = style.standing_colours(decision), shown_factor(decision.unit)
     drawn: set[str] = set()
     ranking: list[int] = decision.ranking.tolist()
     for row, action in enumerate(ranking):
@@ -82,7 +85,7 @@ def _draw_intervals(panel: Panel, decision: Decision) -> list[Entry]:
         if math.isfinite(decision.lower[action]) or math.isfinite(decision.upper[action]):
             colour = colours[action]
             drawn.add(colour)
-            ends = [(float(decision.lower[action]), row), (float(decision.upper[action]), row)]
+            ends = [(factor * float(decision.lower[action]), row), (factor * float(decision.upper[action]), row)]
             panel.line(ends, color=colour, linewidth=5, solid_capstyle="butt", alpha=0.75, zorder=3)
             panel.line(ends, linestyle="none", marker="|", color=colour, markersize=6.5, zorder=3)
     labels = {style.BEST: "chosen", style.SURVIVOR: "may be optimal", style.RULED_OUT: "ruled out"}
@@ -98,7 +101,7 @@ def _draw_exact(panel: Panel, decision: Decision, values: FloatArray) -> list[En
     key: list[Entry] = []
     needed = ~np.isnan(decision.entropies)
     for label, chosen, fill in (("exact, evaluated", needed, style.INK), ("exact, to compare", ~needed, "white")):
-        shown = np.where(chosen, values, np.nan)[decision.ranking]
+        shown = shown_factor(decision.unit) * np.where(chosen, values, np.nan)[decision.ranking]
         if np.isnan(shown).all():
             continue
         look: dict[str, Any] = {"marker": "D", "markersize": 3.6, "markerfacecolor": fill, "markeredgecolor": style.INK}
@@ -110,7 +113,7 @@ def _draw_exact(panel: Panel, decision: Decision, values: FloatArray) -> list[En
 
 def _draw_threshold(panel: Panel, decision: Decision) -> list[Entry]:
     """What a lower bound must not exceed: the chosen one's upper bound, or its value once evaluated."""
-    threshold = float(decision.upper[decision.best])
+    threshold = shown_factor(decision.unit) * float(decision.upper[decision.best])
     if not math.isfinite(threshold):
         return []
     look: dict[str, Any] = {"color": style.INK, "linewidth": 0.9, "linestyle": (0, (4, 2))}
@@ -165,6 +168,4 @@ def _subtitle(decision: Decision) -> str:
         return f"{ranked}; the chosen one is proven optimal"
     if math.isinf(decision.error_bound):
         return f"{ranked}; not all have bounds"
-    unit = "nats per pose" if decision.objective == "per_pose" else "nats"
-    bound = f"{decision.error_bound:.3g}" if decision.error_bound < 1000 else f"{decision.error_bound:.0f}"
-    return f"{ranked}; none is better than the chosen one by more than {bound} {unit}"
+    return f"{ranked}; none is better than the chosen one by more than {quantity(decision.error_bound, decision.unit)}"

@@ -9,7 +9,8 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from topobelief.report.tables import number, quantity_table
+from topobelief.planning.units import cell
+from topobelief.report.tables import quantity_table
 from topobelief.simulation.comparison import StrategySummary
 from topobelief.simulation.metrics import run_metrics
 from topobelief.simulation.record import Leg, Record
@@ -51,7 +52,7 @@ def metrics_table(record: Record) -> Table:
         rows.append((label, f"{whole:.3f} m on all poses, {before:.3f} m on those before the last leg"))
     if "predicted_entropy" in values:
         unit = f"nats ({record.options.objective})"
-        told = ", ".join(f"{name} {number(values[f'{name}_entropy'])}" for name in ("prior", "predicted", "achieved"))
+        told = ", ".join(f"{name} {cell(values[f'{name}_entropy'])}" for name in ("prior", "predicted", "achieved"))
         rows.append(("entropy of the last leg", f"{told} {unit}"))
     driven = values["driven_seconds"]
     for label, name in (("making candidates", "candidates_seconds"), ("deciding", "decision_seconds")):
@@ -79,7 +80,7 @@ def comparison_table(found: Sequence[StrategySummary], *, baseline: str) -> Tabl
             f"{each.num_arrived}/{each.num_runs}",
             f"{each.planned:.1f}",
             f"{each.num_closures:.0f}",
-            number(each.entropy),
+            cell(each.entropy),
             f"{each.error_shared:.3f}",
             f"{each.error_all:.3f}",
             _percent(each.gain),

@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from topobelief.experiments.study.summary import Summary
-from topobelief.report.tables import number
+from topobelief.planning.units import cell
 
 _COLUMNS = ("best", "95 %", "loss", "90 % below", "rank", "exact", "ms", "seeds", "failed")
 
@@ -49,9 +49,9 @@ def _cells(one: Summary) -> tuple[str, ...]:
     return (
         f"{share.value:.0%}",
         f"{100 * share.low:.0f}–{100 * share.high:.0f}",
-        number(one.loss.mean),
-        number(one.loss.high),
-        number(one.spearman.median),
+        cell(one.loss.mean),
+        cell(one.loss.high),
+        cell(one.spearman.median),
         f"{one.evaluations.mean:.1f}",
         f"{1e3 * one.seconds.median:.1f}",
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 
 from rich import box
@@ -10,6 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from topobelief.planning.decision import Decision
+from topobelief.planning.decision_table import decision_table
 
 _STANDINGS = {"yes": "bold green", "maybe": "", "no": "dim"}
 
@@ -19,46 +19,19 @@ def candidate_table(decision: Decision) -> Table:
 
     The last column says whether an action is chosen, may be better still, or cannot be the best.
     """
-    unit = "nats per pose" if decision.objective == "per_pose" else "nats"
+    described = decision_table(decision)
     table = Table(
         box=box.SIMPLE_HEAD,
         padding=(0, 1),
         collapse_padding=True,
         pad_edge=False,
-        caption=f"lower, upper: bounds of the {decision.objective} entropy in {unit}; the less, the better.\n"
-        "Paths are numbered from 0.",
+        caption="\n".join(described.notes),
         caption_justify="left",
     )
-    columns = ["signature", "lower", "upper"]
-    columns += ["exact"] if decision.num_evaluations else []
-    columns += ["cost"] if any(candidate.cost for candidate in decision.candidates) else []
-    table.add_column("#", justify="right", no_wrap=True)
-    table.add_column("action", no_wrap=True)
-    for name in (*columns, "poses", "closures", "metres"):
-        table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("best", no_wrap=True)
-    surviving = set(decision.survivors.tolist())
-    ranking: list[int] = decision.ranking.tolist()
-    for rank, action in enumerate(ranking, start=1):
-        candidate = decision.candidates[action]
-        standing = "yes" if action == decision.best else "maybe" if action in surviving else "no"
-        values = {
-            "signature": decision.signatures[action],
-            "lower": decision.lower[action],
-            "upper": decision.upper[action],
-            "exact": decision.entropies[action],
-            "cost": candidate.cost,
-        }
-        table.add_row(
-            str(rank),
-            Text(decision.name(action)),  # not markup, whatever the label
-            *(number(float(values[name])) for name in columns),
-            str(candidate.num_new_poses),
-            str(candidate.num_closures),
-            f"{candidate.length:.1f}",
-            standing,
-            style=_STANDINGS[standing],
-        )
+    for column in described.columns:
+        table.add_column(column.name, justify="left" if column.is_text else "right", no_wrap=True)
+    for row in described.rows:
+        table.add_row(*map(Text, row.cells), style=_STANDINGS[row.standing])  # not markup, whatever the label
     return table
 
 
@@ -70,8 +43,3 @@ def quantity_table(title: str, quantities: Iterable[tuple[str, str]]) -> Table:
     for name, value in quantities:
         table.add_row(Text("  " + name), Text(value))
     return table
-
-
-def number(value: float) -> str:
-    """Two decimals, a dash where there is none."""
-    return "–" if math.isnan(value) else f"{value:.2f}"

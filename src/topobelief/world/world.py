@@ -66,6 +66,10 @@ class World:
         object.__setattr__(self, "free", region)
         object.__setattr__(self, "bounds", _checked_bounds(shapes.extent(region) if bounds is None else bounds))
 
+    def __repr__(self) -> str:
+        x_min, y_min, x_max, y_max = self.bounds
+        return f"World({x_max - x_min:.1f} × {y_max - y_min:.1f} m, {self.free.area:.1f} m² free)"
+
     @classmethod
     def from_boxes(cls, boxes: ArrayLike, bounds: Sequence[float] | None = None) -> World:
         """A floor plan of axis-aligned walls, closed by a fence along its bounds.
