@@ -69,6 +69,15 @@ def test_missing_bounds_leave_rows_empty_and_no_dashed_line(make_decision):
     assert key(figure) == []
 
 
+def test_a_single_candidate_is_compared_with_nothing(make_decision):
+    figure = draw_bounds(make_decision(1), entropies=[-100.0])
+    assert key(figure) == ["chosen", "exact"]
+    assert [text.get_text() for text in figure.texts[-2:]] == [
+        "path 0, the only candidate",
+        "there is nothing to compare it with",
+    ]
+
+
 def test_the_title_counts_what_was_ruled_out(make_decision):
     texts = [text.get_text() for text in draw_bounds(make_decision(5)).texts]
     assert "2 of 5 candidates cannot be the best: their lower bound exceeds the dashed line" in texts

@@ -12,11 +12,13 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
+from topobelief.candidates.start import find_start
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.planner import Planner
+from topobelief.report.map_layers import Sight
 from topobelief.report.paths_figure import draw_paths
-from topobelief.report.style import BEST, CLOSURE, FREE, NOT_FREE, ODOMETRY, PREDICTED_CLOSURE
+from topobelief.report.style import BEST, CLOSURE, FREE, NOT_FREE, ODOMETRY, PREDICTED_CLOSURE, SEEN_AGAIN
 from topobelief.world import World
 
 OMEGA = np.diag([100.0, 100.0, 400.0])
@@ -60,6 +62,30 @@ def test_odometry_closures_and_predicted_closures_of_the_best_are_told_apart(sce
     assert len(segments(figure, ODOMETRY)) == 4
     assert segments(figure, CLOSURE).tolist() == [[[1, 2], [3, 2]]]
     assert segments(figure, PREDICTED_CLOSURE).tolist() == [[[3, 5], [2, 2]], [[3, 5], [3, 2]]]
+
+
+def test_poses_seen_again_lie_on_a_band(scene):
+    """Each as a dot, and joined where they follow one another."""
+    figure = drawn(scene)
+    assert segments(figure, SEEN_AGAIN).tolist() == [[[2, 2], [3, 2]], [[2, 2], [2, 2]], [[3, 2], [3, 2]]]
+    assert "poses it sees again (2)" in {text.get_text() for text in figure.legends[0].get_texts()}
+    assert any(text.get_text().endswith("2 closures; sees poses 1 to 2 again") for text in figure.texts)
+
+
+def test_of_many_closures_the_two_shortest_of_each_new_pose_are_drawn(scene):
+    graph, paths, _, _ = scene
+    action = Action([(5, 3, 2), (5, 8, 1)], [(4, 5), (5, 6), (5, 0), (1, 5), (5, 2), (5, 3), (6, 0)], OMEGA, label="left")
+    figure = draw_paths(graph, ROOM, paths[:1], [action], Planner(graph).decide([action]), goal=(5, 8))
+    assert segments(figure, PREDICTED_CLOSURE).tolist() == [[[5, 3], [3, 2]], [[5, 3], [4, 2]], [[5, 8], [1, 2]]]
+    assert "its predicted closures (3 of 5)" in {text.get_text() for text in figure.legends[0].get_texts()}
+
+
+def test_stretches_are_named_by_ids_those_with_most_poses_first():
+    graph = PoseGraph([[x, 0, 0] for x in range(20)], [(x, x + 1) for x in range(19)], None, OMEGA, ids=range(100, 120))
+    action = Action([(0, 1, 0)], [(19, 20), *((20, seen) for seen in (0, 4, 6, 9, 15, 16))], OMEGA)
+    sight = Sight.of(graph, find_start(graph), action)
+    assert sight.seen.tolist() == [0, 4, 6, 9, 15, 16]
+    assert sight.stretches(graph) == [("104", "109"), ("115", "116"), ("100", "100")]
 
 
 def test_the_key_counts_survivors_and_ruled_out(scene):
@@ -109,6 +135,7 @@ def test_a_single_path_without_closures_is_drawn(scene):
     figure = draw_paths(graph, ROOM, paths[1:], actions[1:], decision, goal=(5, 8))
     assert len(segments(figure, PREDICTED_CLOSURE)) == 0
     assert any(text.get_text() == "right on the pose graph, the only candidate" for text in figure.texts)
+    assert "right, the only candidate" in {text.get_text() for text in figure.legends[0].get_texts()}
 
 
 def test_a_start_elsewhere_is_marked_and_its_odometry_is_no_closure(scene):

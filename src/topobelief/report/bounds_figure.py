@@ -100,7 +100,8 @@ def _draw_exact(panel: Panel, decision: Decision, values: FloatArray) -> list[En
     """Filled where the decision evaluated it, hollow where it is known for comparison alone."""
     key: list[Entry] = []
     needed = ~np.isnan(decision.entropies)
-    for label, chosen, fill in (("exact, evaluated", needed, style.INK), ("exact, to compare", ~needed, "white")):
+    comparison = "exact, to compare" if decision.num_actions > 1 else "exact"
+    for label, chosen, fill in (("exact, evaluated", needed, style.INK), (comparison, ~needed, "white")):
         shown = shown_factor(decision.unit) * np.where(chosen, values, np.nan)[decision.ranking]
         if np.isnan(shown).all():
             continue
@@ -114,12 +115,12 @@ def _draw_exact(panel: Panel, decision: Decision, values: FloatArray) -> list[En
 def _draw_threshold(panel: Panel, decision: Decision) -> list[Entry]:
     """What a lower bound must not exceed: the chosen one's upper bound, or its value once evaluated."""
     threshold = shown_factor(decision.unit) * float(decision.upper[decision.best])
-    if not math.isfinite(threshold):
+    if not math.isfinite(threshold) or decision.num_actions == 1:
         return []
     look: dict[str, Any] = {"color": style.INK, "linewidth": 0.9, "linestyle": (0, (4, 2))}
     panel.axes.axvline(threshold, zorder=4, **look)
     evaluated = not math.isnan(decision.entropies[decision.best])
-    return [Entry("least value found" if evaluated else "its upper bound", **look)]
+    return [Entry("least value found" if evaluated else "upper bound of the chosen", **look)]
 
 
 def _write_columns(canvas: Canvas, decision: Decision) -> None:
@@ -161,6 +162,8 @@ def _title(decision: Decision) -> str:
 
 
 def _subtitle(decision: Decision) -> str:
+    if decision.num_actions == 1:
+        return "there is nothing to compare it with"
     ranked = f"in the order of {style.SIGNATURES.get(decision.signature, decision.signature)}, best first"
     if decision.margin_met is not None:
         return f"{ranked}; the margin is {'met' if decision.margin_met else 'missed'}"

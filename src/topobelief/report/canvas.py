@@ -88,6 +88,16 @@ class Panel:
             self.axes.spines[side].set_visible(False)
         self.axes.set_xlabel(label)
 
+    def names(self, names: Sequence[str]) -> None:
+        """What the rows 0, 1, … are called, along the left edge."""
+        self.axes.set_yticks(range(len(names)), names)
+        self.axes.tick_params(axis="y", length=0)
+
+    def key(self, entries: Sequence[Entry]) -> None:
+        """What the colours and marks mean, on the right of the axes."""
+        handles = [entry.handle for entry in entries]
+        self.axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0.0, frameon=False)
+
     def no_ticks(self) -> None:
         """A frame without numbers."""
         self.axes.set(xlabel="", ylabel="", xticks=[], yticks=[])
@@ -127,6 +137,13 @@ class Canvas:
             handlelength=1.8,
             labelspacing=0.55,
         )
+
+
+def new_panel(width: float, height: float) -> Panel:
+    """Axes of pyplot on a new figure of a size in inches, which a notebook shows by itself."""
+    from matplotlib import pyplot as plt  # chooses a backend, so only where a caller brings no axes
+
+    return Panel(cast("Any", plt).subplots(figsize=(width, height), layout="constrained")[1])
 
 
 def save_figure(figure: Figure, path: str | PathLike[str]) -> None:

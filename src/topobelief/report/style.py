@@ -20,13 +20,14 @@ RULED_OUT = "#8C8C8C"
 ODOMETRY = "#5B6C7D"
 CLOSURE = "#8CC5E3"
 PREDICTED_CLOSURE = "#009E73"  # bluish green
+SEEN_AGAIN = "#B5E3D4"  # the same, light: a band beneath other lines
 GOAL = "#F0E442"  # yellow, always with a dark edge
 INK = "#222222"
 MUTED = "#5A5A5A"
 GRID = "#DADADA"
 STRIPE = "#F6F6F7"
 FREE = "#FFFFFF"
-NOT_FREE = "#E3E4E6"
+NOT_FREE = "#EBECEE"
 WALL = "#A5A8AD"
 
 SIGNATURES = {
