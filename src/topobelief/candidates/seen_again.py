@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from topobelief.arrays import IntArray
+from topobelief.arrays import BoolArray
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.symbols import node_name
@@ -23,12 +23,18 @@ class Stretch:
     first: int  # index of a pose
     last: int
     num_closures: int
+    expected: float  # of these, by their probabilities
     first_new: int  # of the action's new poses that close them, counted from 0
     last_new: int
 
+    def name(self, graph: PoseGraph) -> str:
+        """Its first and last pose, by what the file calls them: "31 to 46"."""
+        first, last = (node_name(int(graph.ids[index])) for index in (self.first, self.last))
+        return first if self.first == self.last else f"{first} to {last}"
 
-def closures_of(graph: PoseGraph, start: int, action: Action) -> IntArray:
-    """The measurements of an action that are not its odometry, smaller index first, shape (number of closures, 2).
+
+def closing_edges(graph: PoseGraph, start: int, action: Action) -> BoolArray:
+    """Which measurements of an action are not its odometry, shape (number of edges,).
 
     Parameters
     ----------
@@ -38,23 +44,24 @@ def closures_of(graph: PoseGraph, start: int, action: Action) -> IntArray:
     action
     """
     low, high = np.sort(action.edges, axis=1).T
-    odometry = (low == start) & (high == graph.num_poses)
-    odometry |= (low >= graph.num_poses) & (high - low == 1)
-    return np.stack([low, high], axis=1)[~odometry]
+    first = (low == start) & (high == graph.num_poses)
+    between_new = (low >= graph.num_poses) & (high - low == 1)
+    return ~(first | between_new)
 
 
 def seen_again(graph: PoseGraph, start: int, action: Action) -> list[Stretch]:
-    """Stretches of the graph's poses with which an action closes loops, those with most closures first; as `closures_of`."""
-    closures = closures_of(graph, start, action)
-    old, new = closures[closures[:, 0] < graph.num_poses].T
-    if not old.size:
+    """Stretches of the graph's poses with which an action closes loops, those with most closures first; see `closing_edges`."""
+    low, high = np.sort(action.edges, axis=1).T
+    chance = np.ones(len(low)) if action.probabilities is None else action.probabilities
+    edges = np.flatnonzero(closing_edges(graph, start, action) & (low < graph.num_poses))
+    if not edges.size:
         return []
-    order = np.argsort(old, kind="stable")
-    old, new = old[order], new[order] - graph.num_poses
-    parts = np.split(np.arange(len(old)), np.flatnonzero(np.diff(old) > _GAP) + 1)
-    stretches = [
-        Stretch(int(old[part[0]]), int(old[part[-1]]), len(part), int(new[part].min()), int(new[part].max())) for part in parts
-    ]
+    edges = edges[np.argsort(low[edges], kind="stable")]
+    stretches: list[Stretch] = []
+    for part in np.split(edges, np.flatnonzero(np.diff(low[edges]) > _GAP) + 1):
+        new = high[part] - graph.num_poses
+        ends = (int(low[part[0]]), int(low[part[-1]]))
+        stretches.append(Stretch(*ends, len(part), float(chance[part].sum()), int(new.min()), int(new.max())))
     return sorted(stretches, key=lambda stretch: -stretch.num_closures)
 
 
@@ -62,14 +69,23 @@ def described(graph: PoseGraph, stretches: Sequence[Stretch], *, most: int = 3) 
     """The stretches in words, by what the file calls poses: "sees poses 31 to 46 and 3 again, 12 closures"."""
     if not stretches:
         return "sees no pose again"
-    ids: list[int] = graph.ids.tolist()
-    names = [
-        node_name(ids[each.first]) + (f" to {node_name(ids[each.last])}" if each.last > each.first else "")
-        for each in stretches[:most]
-    ]
+    names = [stretch.name(graph) for stretch in stretches[:most]]
     if len(stretches) > most:
         names.append(f"{len(stretches) - most} more stretches" if len(stretches) > most + 1 else "1 more stretch")
     listed = " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
     one = len(stretches) == 1 and stretches[0].first == stretches[0].last
-    total = sum(each.num_closures for each in stretches)
-    return f"sees pose{'' if one else 's'} {listed} again, {counted(total, 'closure')}"
+    closures = closures_in_words(sum(each.num_closures for each in stretches), sum(each.expected for each in stretches))
+    return f"sees pose{'' if one else 's'} {listed} again, {closures}"
+
+
+def closures_in_words(number: int, expected: float) -> str:
+    """How many closures there may be, and how many are expected where that is fewer.
+
+    Examples
+    --------
+    >>> closures_in_words(12, 12.0), closures_in_words(40, 2.3)
+    ('12 closures', '2.3 of 40 possible closures')
+    """
+    if round(expected, 1) == number:
+        return counted(number, "closure")
+    return f"{expected:.1f} of {counted(number, 'possible closure')}"

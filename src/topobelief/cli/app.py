@@ -26,7 +26,7 @@ _UsageError = cast("type[Exception]", typer.BadParameter.__mro__[1])
 
 app = typer.Typer(name="topobelief", pretty_exceptions_enable=False)
 app.command(cls=PlaceCommand)(plan)
-app.command(cls=Command)(info)
+app.command(cls=PlaceCommand)(info)
 app.command(cls=Command)(benchmark)
 app.command(cls=Command)(reproduce)
 app.command(cls=Command)(simulate)

@@ -50,6 +50,7 @@ def plan(
     max_evaluations: options.MaxEvaluations = None,
     optimize: options.Optimize = True,
     exact: options.Exact = True,
+    why: options.Why = None,
     out: options.Out = None,
     write_path: options.WritePath = None,
     as_json: options.AsJson = False,
@@ -73,7 +74,7 @@ def plan(
     with reporter.stage("start-up"):
         from topobelief.candidates.predicted_factors import KEY_POSE_TURN
         from topobelief.candidates.propose import CandidateRule
-        from topobelief.cli import plan_candidates, plan_ends, plan_files, plan_stages, plan_world
+        from topobelief.cli import plan_candidates, plan_ends, plan_errors, plan_files, plan_reasons, plan_stages, plan_world
         from topobelief.cli.closure_options import stated_closures, with_closures
         from topobelief.planning.planner import Planner
 
@@ -132,7 +133,16 @@ def plan(
             deadline=deadline,
             on_progress=lambda _, done, total: update(done, total),
         )
-    plan_stages.say_decision(decision, rule, reporter, along_trajectory=along_trajectory)
+    explained = plan_reasons.asked_for(decision, why or ())
+    errors = plan_errors.expected(graph, found, decision, reporter)
+    reasons = plan_reasons.reasons(graph, begin, found, decision, errors)
+    answer = plan_errors.answer(found, decision, errors)
+    plan_stages.say_decision(decision, answer, rule, reporter, along_trajectory=along_trajectory)
+
+    def detailed(index: int) -> list[str]:
+        return plan_reasons.details(graph, begin, found, decision, index, reporter)
+
+    plan_reasons.say(reasons, decision, explained, detailed, reporter)
     entropies = plan_stages.exact_entropies(planner, found.actions, decision, reporter, wanted=exact and folder is not None)
     result = plan_files.PlanResult(
         graph=graph,
@@ -142,6 +152,8 @@ def plan(
         proposals=found,
         decision=decision,
         entropies=entropies,
+        errors=errors,
+        reasons=reasons,
         rule=rule,
         options=context.params | {"objective": objective, "signature": signature, "proof": proof},
         notes=reporter.notes,

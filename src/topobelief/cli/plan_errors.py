@@ -71,7 +71,7 @@ def answer(proposals: Proposals, decision: Decision, errors: PlanErrors) -> str:
     now = centimetres(errors.now.map_rmse)[0]
     return (
         f"{drive}: {map_error}; at the goal {at_goal[0]} cm instead of {at_goal[1]}. "
-        f"Instead: after {decision.name(errors.shortest_path)}, the shortest. Now the map's expected error is {now} cm."
+        f"That is against {decision.name(errors.shortest_path)}, the shortest; now the map's expected error is {now} cm."
     )
 
 

@@ -20,6 +20,7 @@ from topobelief.cli.console import Reporter
 from topobelief.cli.plan_arguments import GivenPlace
 from topobelief.cli.plan_candidates import Proposals
 from topobelief.cli.plan_ends import Goal
+from topobelief.cli.plan_errors import PlanErrors
 from topobelief.errors import FileError
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.files import atomic_file
@@ -41,6 +42,8 @@ class PlanResult:
     proposals: Proposals
     decision: Decision
     entropies: FloatArray  # (K,): exact values, whether or not the decision needed them; nan where unknown
+    errors: PlanErrors
+    reasons: Sequence[str]  # K
     rule: CandidateRule
     options: Mapping[str, object]  # as given, what the rule settles aside
     notes: Sequence[str]
@@ -89,10 +92,10 @@ def document(result: PlanResult) -> dict[str, object]:
     paths, goals = result.proposals.paths, result.proposals.goals
     plain = decision.to_dict()
     exact = without_nan(result.entropies.tolist())
-    described = zip(plain["actions"], paths, goals, exact, strict=True)
+    described = zip(plain["actions"], paths, goals, exact, result.reasons, strict=True)
     actions = [
-        {**action, "goal": goal, "waypoints": path.tolist(), "exact_for_comparison": value}
-        for action, path, goal, value in described
+        {**action, "goal": goal, "waypoints": path.tolist(), "exact_for_comparison": value, "why": why}
+        for action, path, goal, value, why in described
     ]
     best = paths[decision.best]
     return {
@@ -104,6 +107,7 @@ def document(result: PlanResult) -> dict[str, object]:
             "length": path_length(best),
             "x_y_yaw": path_poses(best).tolist(),
         },
+        "expected_errors": result.errors.document(),
         "notes": list(result.notes),
         "topobelief": __version__,
         "graph": {"num_poses": graph.num_poses, "num_edges": graph.num_edges, "chi2": graph.chi2},
@@ -165,7 +169,7 @@ def _pictures(result: PlanResult) -> dict[str, Callable[[Path], object]]:
         found.paths,
         found.actions,
         decision,
-        goal=result.goals[0].place,
+        goal=[goal.place for goal in result.goals] or [found.paths[decision.best][-1]],
         start=result.start,
     )
     bounds = draw_bounds(decision, result.entropies)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from topobelief.candidates.seen_again import described, seen_again
+from topobelief.candidates.seen_again import closures_in_words, described, seen_again
 from topobelief.candidates.start import Start
 from topobelief.cli.console import Reporter
 from topobelief.cli.plan_candidates import Proposals
@@ -18,8 +18,8 @@ from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.decision import Decision
 from topobelief.planning.units import quantity
 from topobelief.position_errors import expected_errors
-from topobelief.symbols import node_name
 
+_MOST = 20  # reasons told unasked
 _EQUAL = 1e-6  # of a value: candidates that differ by less are as good
 
 
@@ -73,6 +73,21 @@ def _claim(decision: Decision) -> str:
     return "chosen: first of the ranking by signature"
 
 
+def say(
+    reasons: Sequence[str],
+    decision: Decision,
+    asked: Sequence[int],
+    detailed: Callable[[int], Sequence[str]],
+    reporter: Reporter,
+) -> None:
+    """The reasons of the first of the ranking; or of those that were asked for, each with details."""
+    reporter.say("Why, and why not:")
+    for index in asked or decision.ranking.tolist()[:_MOST]:
+        reporter.say(f"  {reasons[index]}", *(detailed(index) if asked else ()))
+    if not asked and len(reasons) > _MOST:
+        reporter.say(f"  and {len(reasons) - _MOST} more: --why N, or decision.json")
+
+
 def asked_for(decision: Decision, names: Sequence[str]) -> list[int]:
     """The candidates of --why, by number or label.
 
@@ -103,7 +118,7 @@ def details(
     candidate, action = decision.candidates[index], proposals.actions[index]
     rank = 1 + decision.ranking.tolist().index(index)
     lines = [
-        f"  {candidate.length:.1f} m, {candidate.num_new_poses} new poses; rank {rank} of {decision.num_actions} by signature"
+        f"    {candidate.length:.1f} m, {candidate.num_new_poses} new poses; rank {rank} of {decision.num_actions} by signature"
     ]
     with reporter.stage("errors"), warnings.catch_warnings():
         warnings.simplefilter("ignore", NotOptimizedWarning)
@@ -115,14 +130,11 @@ def details(
             )
         except IllConditionedError:
             pass
-    ids: list[int] = graph.ids.tolist()
     driven = np.cumsum(np.linalg.norm(np.diff(np.vstack([start.place, action.poses[:, :2]]), axis=0), axis=1))
     for stretch in seen_again(graph, start.pose, action):
-        poses = f"pose {node_name(ids[stretch.first])}"
-        if stretch.last > stretch.first:
-            poses = f"poses {node_name(ids[stretch.first])} to {node_name(ids[stretch.last])}"
-        closures = f"{stretch.num_closures} closure{'' if stretch.num_closures == 1 else 's'}"
+        poses = f"pose{'s' if stretch.last > stretch.first else ''} {stretch.name(graph)}"
+        closures = closures_in_words(stretch.num_closures, stretch.expected)
         lines.append(
-            f"  {poses}: {closures}, {driven[stretch.first_new]:.1f} to {driven[stretch.last_new]:.1f} m along the path"
+            f"    {poses}: {closures}, {driven[stretch.first_new]:.1f} to {driven[stretch.last_new]:.1f} m along the path"
         )
     return lines

@@ -102,9 +102,9 @@ def exact_entropies(
     return values
 
 
-def say_decision(decision: Decision, rule: CandidateRule, reporter: Reporter, *, along_trajectory: bool) -> None:
-    """The answer, what to make of it, and the table."""
-    reporter.say("", decision.summary())
+def say_decision(decision: Decision, answer: str, rule: CandidateRule, reporter: Reporter, *, along_trajectory: bool) -> None:
+    """The answer, what is known of it, what to make of it, and the table."""
+    reporter.say("", answer, decision.summary())
     for hint in (length_bias_hint(decision), more_candidates_hint(decision, rule, along_trajectory=along_trajectory)):
         if hint:
             reporter.note(hint)

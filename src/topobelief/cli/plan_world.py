@@ -16,7 +16,14 @@ from topobelief.world.trajectory import default_width
 _DOUBTFUL_SHARE = 0.1  # of the poses outside free space, above which map and graph may not belong together
 
 
-def read_world(map_file: Path | None, graph: PoseGraph, reporter: Reporter, *, width: float | None, unknown: Unknown) -> World:
+def read_world(
+    map_file: Path | None,
+    graph: PoseGraph,
+    reporter: Reporter,
+    *,
+    width: float | None = None,
+    unknown: Unknown = "occupied",
+) -> World:
     """The floor plan, or what lies along the trajectory where there is none."""
     with reporter.stage("world"):
         if map_file is not None:
