@@ -39,16 +39,6 @@ _BOUNDS: tuple[tuple[Family, Determinant], ...] = (
 _MOST_COMPONENTS = 10  # listed for a person
 
 Value = str | int | float | None | dict[str, float] | Sequence[int | Sequence[float] | Mapping[str, object]]
-    str
-    | int
-    | float
-    | None
-    | dict[str, float]
-    | list[int]
-    | list[list[float]]
-    | list[dict[str, object]]
-    | list[dict[str, int | float | None]]
-)
 
 
 @dataclass(frozen=True, slots=True)
