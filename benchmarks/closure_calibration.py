@@ -2,9 +2,9 @@
 
     python benchmarks/closure_calibration.py office --seeds 10 --out out/closure-calibration
 
-drives a scenario for each seed (extra `sim`) and keeps what each decision knew, decided and led to; seeds that are there already
-are not driven again. Then it prints, seed by seed and as medians, predicted and found key poses and closures, and predicted and
-achieved gain in map entropy, by the closure model that is learned today. With `--seeds 0` it only reads what is there.
+drives a scenario for each seed (extra `sim`) and keeps what each decision knew, decided and led to; seeds that are there
+already are not driven again. Then it prints, seed by seed and as medians, predicted and found key poses and closures, and
+predicted and achieved gain in map entropy, by the closure model of today. With `--seeds 0` it only reads what is there.
 """
 
 from __future__ import annotations
@@ -109,6 +109,7 @@ def read(file: Path, scenario: str) -> list[Row]:
         (action,) = predict_actions(
             prior,
             [leg["path"]],
+            closures=tb.learn_closures(prior, world=world, rule=settings.expected_closures),
             information=information,
             spacing=settings.key_pose_distance,
             turn=settings.key_pose_angle,

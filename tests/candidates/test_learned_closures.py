@@ -28,8 +28,8 @@ def test_counts_radius_and_probability_are_those_of_the_history() -> None:
     graph = rounds([(i, i - 20) for i in range(20, 40, 2)])
     model = learn_closures(graph)
     assert (model.max_per_pose, model.min_index_gap, model.num_observed) == (1, 5, 10)
-    assert model.radius == pytest.approx(0.1)
-    assert model.angle == pytest.approx(0, abs=1e-9)
+    assert model.radius == pytest.approx(0.5)  # half a step of odometry, for 0.1 m are less
+    assert model.angle == pytest.approx(math.radians(15))  # for 0 are less
     wide = learn_closures(rounds([*((i, i - 20) for i in range(20, 39, 2)), (39, 20), (38, 21)]))
     assert wide.radius > 0.7
     assert wide.num_observed == 12
