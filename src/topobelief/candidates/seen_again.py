@@ -11,7 +11,7 @@ from topobelief.arrays import BoolArray
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.symbols import node_name
-from topobelief.wording import counted
+from topobelief.wording import closures_in_words
 
 _GAP = 3  # poses; one stretch goes on across fewer that are not seen
 
@@ -76,16 +76,3 @@ def described(graph: PoseGraph, stretches: Sequence[Stretch], *, most: int = 3) 
     one = len(stretches) == 1 and stretches[0].first == stretches[0].last
     closures = closures_in_words(sum(each.num_closures for each in stretches), sum(each.expected for each in stretches))
     return f"sees pose{'' if one else 's'} {listed} again, {closures}"
-
-
-def closures_in_words(number: int, expected: float) -> str:
-    """How many closures there may be, and how many are expected where that is fewer.
-
-    Examples
-    --------
-    >>> closures_in_words(12, 12.0), closures_in_words(40, 2.3)
-    ('12 closures', '2.3 of 40 possible closures')
-    """
-    if round(expected, 1) == number:
-        return counted(number, "closure")
-    return f"{expected:.1f} of {counted(number, 'possible closure')}"

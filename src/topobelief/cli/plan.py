@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import typer
@@ -72,10 +73,20 @@ def plan(
 
     reporter = Reporter(as_json=as_json)
     with reporter.stage("start-up"):
+        from topobelief.candidates.closure_rate import rate_warning
         from topobelief.candidates.predicted_factors import KEY_POSE_TURN
         from topobelief.candidates.propose import CandidateRule
-        from topobelief.cli import plan_candidates, plan_ends, plan_errors, plan_files, plan_reasons, plan_stages, plan_world
-        from topobelief.cli.closure_options import stated_closures, with_closures
+        from topobelief.cli import (
+            plan_candidates,
+            plan_draws,
+            plan_ends,
+            plan_errors,
+            plan_files,
+            plan_reasons,
+            plan_stages,
+            plan_world,
+        )
+        from topobelief.cli.closure_options import stated_closures, told_closures
         from topobelief.planning.planner import Planner
 
     folder = plan_files.checked_folder(out if out is not None or as_json else Path("out"))
@@ -109,7 +120,8 @@ def plan(
     world = plan_world.read_world(map_file, graph, reporter, width=width, unknown=unknown)
     begin = plan_ends.choose_start(graph, world, reporter, start)
     goals = plan_ends.choose_goals(graph, goal or ())
-    rule = with_closures(rule, graph, world, reporter)
+    model = told_closures(rule.closures, graph, world, reporter, line_of_sight=rule.line_of_sight)
+    rule = replace(rule, closures=model)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NotOptimizedWarning)  # `read_graph` has told
         planner = Planner(
@@ -124,6 +136,8 @@ def plan(
     found = plan_candidates.find_proposals(
         graph, world, begin, goals, path or (), rule, reporter, cost_per_metre=cost_per_metre
     )
+    if warning := rate_warning(graph, model, found.actions):
+        reporter.note(warning)
     with reporter.stage("decision") as update:
         decision = planner.decide(
             found.actions,
@@ -143,6 +157,7 @@ def plan(
         return plan_reasons.details(graph, begin, found, decision, index, reporter)
 
     plan_reasons.say(reasons, decision, explained, detailed, reporter)
+    spreads = plan_draws.spreads(planner, found, decision, errors.shortest_path, reporter, seed=seed)
     entropies = plan_stages.exact_entropies(planner, found.actions, decision, reporter, wanted=exact and folder is not None)
     result = plan_files.PlanResult(
         graph=graph,
@@ -154,6 +169,7 @@ def plan(
         entropies=entropies,
         errors=errors,
         reasons=reasons,
+        spreads=spreads,
         rule=rule,
         options=context.params | {"objective": objective, "signature": signature, "proof": proof},
         notes=reporter.notes,

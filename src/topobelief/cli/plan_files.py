@@ -19,6 +19,7 @@ from topobelief.candidates.start import Start
 from topobelief.cli.console import Reporter
 from topobelief.cli.plan_arguments import GivenPlace
 from topobelief.cli.plan_candidates import Proposals
+from topobelief.cli.plan_draws import Spread
 from topobelief.cli.plan_ends import Goal
 from topobelief.cli.plan_errors import PlanErrors
 from topobelief.errors import FileError
@@ -44,6 +45,7 @@ class PlanResult:
     entropies: FloatArray  # (K,): exact values, whether or not the decision needed them; nan where unknown
     errors: PlanErrors
     reasons: Sequence[str]  # K
+    spreads: Sequence[Spread]  # of the finalists
     rule: CandidateRule
     options: Mapping[str, object]  # as given, what the rule settles aside
     notes: Sequence[str]
@@ -108,6 +110,7 @@ def document(result: PlanResult) -> dict[str, object]:
             "x_y_yaw": path_poses(best).tolist(),
         },
         "expected_errors": result.errors.document(),
+        "closure_draws": [asdict(spread) for spread in result.spreads],
         "notes": list(result.notes),
         "topobelief": __version__,
         "graph": {"num_poses": graph.num_poses, "num_edges": graph.num_edges, "chi2": graph.chi2},

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from topobelief.candidates.seen_again import closures_in_words, described, seen_again
+from topobelief.candidates.seen_again import described, seen_again
 from topobelief.candidates.start import Start
 from topobelief.cli.console import Reporter
 from topobelief.cli.plan_candidates import Proposals
@@ -18,6 +18,7 @@ from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.decision import Decision
 from topobelief.planning.units import quantity
 from topobelief.position_errors import expected_errors
+from topobelief.wording import closures_in_words
 
 _MOST = 20  # reasons told unasked
 _EQUAL = 1e-6  # of a value: candidates that differ by less are as good

@@ -15,6 +15,7 @@ from topobelief.io.json_values import without_nan
 from topobelief.planning.decision_table import as_html, as_text, decision_table
 from topobelief.planning.registry import OBJECTIVES, chosen
 from topobelief.planning.units import quantity, shown_factor, shown_unit
+from topobelief.wording import closures_in_words
 
 SCHEMA = "topobelief.decision/2"
 
@@ -33,7 +34,13 @@ class Candidate:
     num_new_poses: int
     num_closures: int
     length: float  # metres, of the path that the robot drives
-    cost: float  # nats
+    cost: float  # in the unit of the objective
+    expected_closures: float = math.nan  # by their probabilities; nan: all are certain
+
+    def closures(self, noun: str = "closure") -> str:
+        """How many closures it has, and how many are expected, in words: "6.9 of 87 possible closures"."""
+        certain = math.isnan(self.expected_closures)
+        return closures_in_words(self.num_closures, float(self.num_closures) if certain else self.expected_closures, noun)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -121,8 +128,7 @@ class Decision(ReadOnlyArrays):
         first = self.name(self.best)
         of_total = f" of {total}" if total > 1 else ""
         sentences = [
-            f"{first[:1].upper()}{first[1:]}{of_total} ({candidate.length:.1f} m, {poses}"
-            f"{candidate.num_closures} loop closures) {self._claim()}"
+            f"{first[:1].upper()}{first[1:]}{of_total} ({candidate.length:.1f} m, {poses}{candidate.closures('loop closure')}) {self._claim()}"
         ]
         ruled_out = total - len(self.survivors)
         if self.margin_met is not None:
@@ -186,6 +192,7 @@ class Decision(ReadOnlyArrays):
                     "num_new_poses": candidate.num_new_poses,
                     "num_closures": candidate.num_closures,
                     "length": candidate.length,
+                    "expected_closures": without_nan(candidate.expected_closures),
                     "cost": candidate.cost,
                     "signature": without_nan(self.signatures[index]),
                     "lower": without_nan(self.lower[index]),
@@ -220,7 +227,15 @@ class Decision(ReadOnlyArrays):
                 )
             }
             candidates = tuple(
-                Candidate(a["label"], a["num_new_poses"], a["num_closures"], a["length"], a["cost"]) for a in actions
+                Candidate(
+                    a["label"],
+                    a["num_new_poses"],
+                    a["num_closures"],
+                    a["length"],
+                    a["cost"],
+                    _from_json(a.get("expected_closures"), unknown=math.nan),
+                )
+                for a in actions
             )
             return cls(
                 best=data["best"],

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Literal
@@ -58,7 +59,10 @@ def decision_table(decision: Decision) -> DecisionTable:
     if any(candidate.cost for candidate in decision.candidates):
         values["cost"] = [cell(candidate.cost, unit) for candidate in decision.candidates]
     values["poses"] = [str(candidate.num_new_poses) for candidate in decision.candidates]
-    values["closures"] = [str(candidate.num_closures) for candidate in decision.candidates]
+    values["closures"] = [
+        str(candidate.num_closures) if math.isnan(candidate.expected_closures) else f"{candidate.expected_closures:.1f}"
+        for candidate in decision.candidates
+    ]
     values["metres"] = [f"{candidate.length:.1f}" for candidate in decision.candidates]
     columns = (Column("#"), Column("action", is_text=True), *map(Column, values), Column("best", is_text=True))
     surviving = set(decision.survivors.tolist())

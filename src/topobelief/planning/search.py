@@ -200,9 +200,11 @@ class Search:
         return free if np.isfinite(free.value).all() else self._batch(places).entropies()
 
     def _best(self) -> int:
-        """U^, or the least value once evaluated; the earlier in the ranking where values tie."""
-        values = (self._entropies + self._costs)[self._ranking]
-        return self._ranking[0 if np.isnan(values).all() else int(np.nanargmin(values))]
+        """U^, or the least value once evaluated; the earlier in the ranking where values tie, rounded as signatures are."""
+        values = np.where(np.isnan(self._entropies), np.inf, self._entropies)[self._ranking]
+        if np.isinf(values).all():
+            return self._ranking[0]
+        return self._ranking[int(ranking_of(-values, self._costs[self._ranking])[0])]
 
     def _survivors(self) -> list[int]:
         """Actions that no bound rules out, in ranking order; U^ stays."""
@@ -234,7 +236,14 @@ class Search:
             num_evaluations=int(np.count_nonzero(~np.isnan(self._values))),
             proven_optimal=proven,
             candidates=tuple(
-                Candidate(action.label, action.num_new_poses, action.num_closures, length, action.cost)
+                Candidate(
+                    action.label,
+                    action.num_new_poses,
+                    action.num_closures,
+                    length,
+                    action.cost,
+                    math.nan if action.probabilities is None else action.expected_closures,
+                )
                 for action, length in zip(self._actions, driven_lengths(self._engine.graph, self._actions), strict=True)
             ),
             objective=criteria.objective,

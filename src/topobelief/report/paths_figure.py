@@ -114,7 +114,7 @@ def _title(decision: Decision) -> str:
 def _subtitle(scene: Scene, *, width: float) -> str:
     """The chosen path in numbers, with as many of the stretches that it sees again as there is room for."""
     best, stretches = scene.decision.candidates[scene.decision.best], scene.sight.stretches
-    numbers = f"{best.length:.1f} m, {counted(best.num_new_poses, 'new pose')}, {counted(len(scene.sight.closures), 'closure')}"
+    numbers = f"{best.length:.1f} m, {counted(best.num_new_poses, 'new pose')}, {best.closures()}"
     for named in range(min(_STRETCHES_NAMED, len(stretches)), 0, -1):
         names = [stretch.name(scene.graph) for stretch in stretches[:named]]
         more = f" and {len(stretches) - named} more" if len(stretches) > named else ""
