@@ -43,6 +43,7 @@ from .report.drawing import draw_bounds as draw_bounds
 from .report.drawing import draw_graph as draw_graph
 from .report.drawing import draw_paths as draw_paths
 from .report.progress import progress as progress
+from .signatures.resistance import resistance_signature as resistance_signature
 from .signatures.spanning_trees import log_num_spanning_trees as log_num_spanning_trees
 from .signatures.spanning_trees import spanning_tree_signature as spanning_tree_signature
 from .signatures.von_neumann import von_neumann_entropy as von_neumann_entropy

@@ -45,7 +45,7 @@ def plan(
     allow_dense_spectrum: options.AllowDenseSpectrum = False,
     margin: options.Margin = None,
     deadline: options.Deadline = None,
-    bounds: options.BoundsName = "fischer",
+    bounds: options.BoundsName = None,
     determinant: options.DeterminantName = "cholesky",
     proof: options.ProofName = None,
     max_evaluations: options.MaxEvaluations = None,
@@ -92,8 +92,9 @@ def plan(
     folder = plan_files.checked_folder(out if out is not None or as_json else Path("out"))
     path_file = plan_files.checked_path_file(write_path)
     limit = max_detour if max_detour is not None else math.inf if as_paper else 1.3
-    objective = objective or ("joint" if as_paper else "map")
-    signature = signature or "spanning_trees"
+    objective = objective or ("joint" if as_paper else "error")
+    signature = signature or ("resistance" if objective == "error" else "spanning_trees")
+    bounds = bounds or ("fischer" if as_paper else "auto")
     proof = proof or ("bounded" if as_paper or margin is not None else "optimal")
     rule = CandidateRule(
         num_paths=candidates,
@@ -171,7 +172,7 @@ def plan(
         reasons=reasons,
         spreads=spreads,
         rule=rule,
-        options=context.params | {"objective": objective, "signature": signature, "proof": proof},
+        options=context.params | {"objective": objective, "signature": signature, "bounds": bounds, "proof": proof},
         notes=reporter.notes,
     )
     plan_files.write(folder, path_file, result, reporter)

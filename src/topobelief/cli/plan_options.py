@@ -255,7 +255,7 @@ Deadline = Annotated[
 ]
 
 BoundsName = Annotated[
-    str,
+    str | None,
     typer.Option(
         "--bounds",
         callback=one_of((*BOUNDS, AUTO)),
@@ -263,6 +263,7 @@ BoundsName = Annotated[
         metavar="NAME",
         help="Family of bounds: fischer; fischer_step, tighter; paper, for equal noise; anchored and chain, tightest; "
         "auto, what proves for less.",
+        show_default="auto",
         rich_help_panel=_PROOF,
     ),
 ]

@@ -23,6 +23,7 @@ _SIGNATURE_NAMES = {
     "spanning_trees": "spanning trees",
     "von_neumann": "von Neumann entropy",
     "von_neumann_approx": "von Neumann entropy by degrees",
+    "resistance": "effective resistance",
 }
 
 
@@ -52,11 +53,12 @@ class Decision(ReadOnlyArrays):
     best : int
         The chosen action: the first of the ranking, or the one of least J once evaluated.
     ranking : shape (K,), int
-        All K actions, best signature first (signature - cost for spanning trees), compared to 32 binary digits; ties by index.
+        All K actions, best signature first (signature - cost where the signature has the objective's unit: spanning trees for
+        entropies, resistance for the expected error), compared to 32 binary digits; ties by index.
     signatures : shape (K,)
         Raw signatures.
     lower, upper : shape (K,)
-        Bounds of the objective plus cost, nats, widened by their rounding errors; after an exact evaluation both are that
+        Bounds of the objective plus cost, in `unit`, widened by their rounding errors; after an exact evaluation both are that
         value widened by its error. nan where not computed.
     entropies : shape (K,)
         Exact objective, cost excluded; nan where not evaluated.
@@ -72,6 +74,8 @@ class Decision(ReadOnlyArrays):
     candidates : tuple of Candidate
     objective, signature, bounds, determinant : str
         As given to the planner.
+    unit : str
+        Of the objective, its bounds, costs and margins: "nats", or "m" for the expected error.
     """
 
     best: int
@@ -127,9 +131,8 @@ class Decision(ReadOnlyArrays):
         poses = f"{candidate.num_new_poses} new poses, " if candidate.num_new_poses else ""
         first = self.name(self.best)
         of_total = f" of {total}" if total > 1 else ""
-        sentences = [
-            f"{first[:1].upper()}{first[1:]}{of_total} ({candidate.length:.1f} m, {poses}{candidate.closures('loop closure')}) {self._claim()}"
-        ]
+        facts = f"{candidate.length:.1f} m, {poses}{candidate.closures('loop closure')}"
+        sentences = [f"{first[:1].upper()}{first[1:]}{of_total} ({facts}) {self._claim()}"]
         ruled_out = total - len(self.survivors)
         if self.margin_met is not None:
             upper = f"{self.upper[self.best] * shown_factor(self.unit):.1f} {shown_unit(self.unit)}"
@@ -179,6 +182,7 @@ class Decision(ReadOnlyArrays):
             "signature": self.signature,
             "bounds": self.bounds,
             "determinant": self.determinant,
+            "unit": self.unit,
             "error_bound": without_nan(self.error_bound),
             "margin_met": self.margin_met,
             "num_evaluations": self.num_evaluations,

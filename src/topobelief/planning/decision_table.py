@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Literal
 
+from topobelief.planning.registry import SIGNATURE_UNITS
 from topobelief.planning.units import cell, shown_unit
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ def decision_table(decision: Decision) -> DecisionTable:
     """The actions in ranking order; exact values and costs only where there are any."""
     unit = decision.unit
     values = {
-        "signature": [cell(value) for value in decision.signatures],
+        "signature": [cell(value, SIGNATURE_UNITS.get(decision.signature, "")) for value in decision.signatures],
         "lower": [cell(value, unit) for value in decision.lower],
         "upper": [cell(value, unit) for value in decision.upper],
     }
