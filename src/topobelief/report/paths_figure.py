@@ -1,8 +1,8 @@
 """The candidate paths over the map: what the robot could drive, what it chose, and what it would see again.
 
 Beneath lie the world (free space white, all else grey) and the pose graph as it stands. A band marks the poses that the chosen
-path sees again, and thin lines the shortest of the loop closures that it is predicted to make. Where the candidates fill a small
-part of the world, the large panel shows that part and a small one the whole.
+path sees again, and thin lines the shortest of the loop closures that it is predicted to make. Where the candidates fill a
+small part of the world, the large panel shows that part and a small one the whole.
 """
 
 from __future__ import annotations
