@@ -15,13 +15,13 @@ def counted(count: int, noun: str, plural: str = "") -> str:
 
 
 def closures_in_words(number: int, expected: float, noun: str = "closure") -> str:
-    """How many closures there may be, and how many are expected where that is fewer.
+    """How many closures there may be, and how many are expected where these are fewer than nineteen in twenty.
 
     Examples
     --------
     >>> closures_in_words(12, 12.0), closures_in_words(40, 2.3)
     ('12 closures', '2.3 of 40 possible closures')
     """
-    if round(expected, 1) == number:
+    if expected >= 0.95 * number:
         return counted(number, noun)
     return f"{expected:.1f} of {counted(number, f'possible {noun}')}"

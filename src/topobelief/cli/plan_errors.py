@@ -76,13 +76,14 @@ def answer(proposals: Proposals, decision: Decision, errors: PlanErrors) -> str:
 
 
 def centimetres(*metres: float) -> tuple[str, ...]:
-    """Lengths in centimetres with one digit after the point below 100 cm, and more, up to three, as long as two look alike.
+    """Lengths in centimetres with as many digits as the smallest needs for two, and more, up to three decimals, to tell them apart.
 
     Examples
     --------
-    >>> centimetres(0.0841, 0.119), centimetres(2.5, 2.5), centimetres(0.12341, 0.12352)
-    (('8.4', '11.9'), ('250', '250'), ('12.34', '12.35'))
+    >>> centimetres(0.0841, 0.119), centimetres(2.5, 2.5), centimetres(0.0024, 0.0041), centimetres(0.12341, 0.12352)
+    (('8.4', '11.9'), ('250', '250'), ('0.24', '0.41'), ('12.34', '12.35'))
     """
-    least = 0 if min(metres) >= 1 else 1
+    smallest = 100 * min(metres)
+    least = 0 if smallest >= 100 else 1 if smallest >= 1 else 2
     shown = [tuple(f"{100 * value:.{digits}f}" for value in metres) for digits in range(least, 4)]
     return next((texts for texts in shown if len(set(texts)) == len(texts)), shown[0])

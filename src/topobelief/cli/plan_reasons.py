@@ -35,10 +35,17 @@ def reasons(graph: PoseGraph, start: Start, proposals: Proposals, decision: Deci
 
 def _gain(decision: Decision, index: int, errors: PlanErrors) -> str:
     """How much of the map's error it takes, where that is the objective and known."""
-    value = float(decision.entropies[index])
+    value = _value(decision, index) - decision.candidates[index].cost
     if decision.objective != "error" or math.isnan(value) or errors.now is None:
         return ""
     return f", which takes the map's expected error from {' to '.join(centimetres(errors.now.map_rmse, value))} cm"
+
+
+def _value(decision: Decision, index: int) -> float:
+    """The objective with its cost, evaluated or between bounds that coincide; nan where it is not known."""
+    exact = float(decision.entropies[index]) + decision.candidates[index].cost
+    lower, upper = float(decision.lower[index]), float(decision.upper[index])
+    return (lower + upper) / 2 if upper - lower <= _EQUAL * max(abs(lower), abs(upper)) else exact
 
 
 def _standing(decision: Decision, index: int) -> str:
@@ -47,20 +54,19 @@ def _standing(decision: Decision, index: int) -> str:
     if index == best:
         return _claim(decision)
     name, unit = decision.name(best), decision.unit
-    costs = [candidate.cost for candidate in decision.candidates]
-    with_costs = ", costs included" if any(costs) else ""
-    value, value_of_best = (float(decision.entropies[each]) + costs[each] for each in (index, best))
+    with_costs = ", costs included" if any(candidate.cost for candidate in decision.candidates) else ""
+    value, value_of_best = _value(decision, index), _value(decision, best)
     lower, upper = float(decision.lower[index]), float(decision.upper[best])
     if not math.isnan(value) and not math.isnan(value_of_best):
         worse, scale = value - value_of_best, max(abs(value), abs(value_of_best))
         if worse <= _EQUAL * scale:
             longer = decision.candidates[index].length - decision.candidates[best].length
             return f"as good as {name}, and {longer:.1f} m longer" if longer > 0 else f"as good as {name}"
-        return f"worse than {name} by {quantity(worse, unit)}{with_costs} (exact)"
+        return f"worse than {name} by {quantity(worse, unit)}{with_costs}"
     if math.isnan(lower) or math.isnan(upper):
         return "not compared by bounds, only by its signature"
     if lower > upper:
-        return f"excluded: worse than {name} by at least {quantity(lower - upper, unit)}{with_costs} (lower bound)"
+        return f"excluded by its lower bound: worse than {name} by at least {quantity(lower - upper, unit)}{with_costs}"
     return f"not excluded: it could be better than {name} by up to {quantity(upper - lower, unit)}{with_costs}"
 
 

@@ -65,7 +65,7 @@ class Decision(ReadOnlyArrays):
     survivors : shape (number of survivors,), int
         Actions that may still be optimal, in ranking order; the first of the ranking is always among them.
     error_bound : float
-        No action is better than the best by more than this, in the unit; inf where no bounds were asked for.
+        No action is better than the best by more than this, in `unit`; inf where no bounds were asked for.
     margin_met : bool or None
         Whether the upper bound of the best lies below the margin; None where no margin was given.
     num_evaluations : int
@@ -74,8 +74,6 @@ class Decision(ReadOnlyArrays):
     candidates : tuple of Candidate
     objective, signature, bounds, determinant : str
         As given to the planner.
-    unit : str
-        Of the objective, its bounds, costs and margins: "nats", or "m" for the expected error.
     """
 
     best: int

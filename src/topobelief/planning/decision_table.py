@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal
 
 from topobelief.planning.registry import SIGNATURE_UNITS
 from topobelief.planning.units import cell, shown_unit
+from topobelief.wording import counted
 
 if TYPE_CHECKING:
     from topobelief.planning.decision import Decision
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 Standing = Literal["yes", "maybe", "no"]
 """Whether an action is the best: chosen, may be better than the chosen one, or cannot be the best."""
 
+_HTML_ROWS = 30
 _MUTED = {"no": ' style="opacity: 0.55"', "yes": ' style="font-weight: bold"', "maybe": ""}
 
 
@@ -96,18 +98,24 @@ def as_text(table: DecisionTable) -> str:
 
 
 def as_html(table: DecisionTable, sentence: str) -> str:
-    """A sentence and the table beneath, for a notebook; takes colours and fonts from the page."""
+    """A sentence and the table beneath, for a notebook; takes colours and fonts from the page.
+
+    Of a long table the first rows and that of the best action are shown.
+    """
 
     def line(tag: str, cells: tuple[str, ...], look: str = "") -> str:
         aligned = (
-            f'<{tag} style="text-align: {"left" if column.is_text else "right"}">{escape(text)}</{tag}>'
+            f'<{tag} style="padding: 0.1em 0.6em; text-align: {"left" if column.is_text else "right"}">{escape(text)}</{tag}>'
             for text, column in zip(cells, table.columns, strict=True)
         )
         return f"<tr{look}>{''.join(aligned)}</tr>"
 
     head = line("th", tuple(column.name for column in table.columns))
-    body = "\n".join(line("td", row.cells, _MUTED[row.standing]) for row in table.rows)
-    notes = "<br>".join(map(escape, table.notes))
+    shown = [*table.rows[:_HTML_ROWS], *(row for row in table.rows[_HTML_ROWS:] if row.standing == "yes")]
+    body = "\n".join(line("td", row.cells, _MUTED[row.standing]) for row in shown)
+    left_out = len(table.rows) - len(shown)
+    more = [f"{counted(left_out, 'more action')} in print(decision)."] if left_out else []
+    notes = "<br>".join(map(escape, [*more, *table.notes]))
     return (
         f"<p>{escape(sentence)}</p>\n<table>\n<thead>{head}</thead>\n<tbody>\n{body}\n</tbody>\n</table>\n"
         f"<p><small>{notes}</small></p>"

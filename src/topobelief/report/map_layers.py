@@ -25,7 +25,7 @@ from topobelief.world import World
 _MIN_VIEW = 6.0  # metres
 _CLOSURES_DRAWN = 2  # of each new pose: with all that a rule by hand predicts, nothing else would be seen
 _PART = 0.6  # of the whole map's width and height: candidates that fill less are shown alone
-_BAND = 5.0  # points
+_BAND = 6.5  # points
 _MANY_PATHS = 8  # from here on their lines are thinner
 
 

@@ -1,8 +1,8 @@
 """The candidate paths over the map: what the robot could drive, what it chose, and what it would see again.
 
-Beneath lie the world (free space white, all else grey) and the pose graph as it stands; the chosen path carries the loop
-closures that it is predicted to make. Where the candidates fill a small part of the world, the large panel shows that
-part and a small one the whole.
+Beneath lie the world (free space white, all else grey) and the pose graph as it stands. A band marks the poses that the chosen
+path sees again, and thin lines the shortest of the loop closures that it is predicted to make. Where the candidates fill a
+small part of the world, the large panel shows that part and a small one the whole.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _MAP_WIDTHS, _MAP_HEIGHTS = (2.8, 5.6), (3.1, 6.6)  # inches, least and most
 _LEFT, _BOTTOM, _TOP = 0.75, 0.50, 0.68  # margins of the map, inches
 _SIDE_GAP, _SIDE_WIDTH = 0.15, 2.5  # the column right of it: whole map and key
 _KEY_LINE = 0.195  # height of a line of the key, inches
-_SUBTITLE_LETTER = 0.068  # width, inches
+_SUBTITLE_LETTER = 0.060  # width, inches
 _STRETCHES_NAMED = 2  # in the subtitle at most, those with most poses
 
 
@@ -117,7 +117,8 @@ def _subtitle(scene: Scene, *, width: float) -> str:
     numbers = f"{best.length:.1f} m, {counted(best.num_new_poses, 'new pose')}, {best.closures()}"
     for named in range(min(_STRETCHES_NAMED, len(stretches)), 0, -1):
         names = [stretch.name(scene.graph) for stretch in stretches[:named]]
-        more = f" and {len(stretches) - named} more" if len(stretches) > named else ""
+        others = len(stretches) - named
+        more = f" and {counted(others, 'more stretch', 'more stretches')}" if others else ""
         subtitle = f"{numbers}; sees poses {', '.join(names)}{more} again"
         if len(subtitle) * _SUBTITLE_LETTER < width:
             return subtitle
