@@ -28,6 +28,8 @@ from .io.floor_plan import read_world as read_world
 from .io.formats import read_pose_graph as read_pose_graph
 from .io.g2o import read_g2o as read_g2o
 from .io.g2o import write_g2o as write_g2o
+from .io.path_formats import read_path as read_path
+from .io.path_formats import write_path as write_path
 from .io.reading import ReadingOptions as ReadingOptions
 from .io.ros_map import read_ros_map as read_ros_map
 from .io.ros_map import write_ros_map as write_ros_map
@@ -43,6 +45,7 @@ from .report.drawing import draw_bounds as draw_bounds
 from .report.drawing import draw_graph as draw_graph
 from .report.drawing import draw_paths as draw_paths
 from .report.progress import progress as progress
+from .signatures.resistance import resistance_signature as resistance_signature
 from .signatures.spanning_trees import log_num_spanning_trees as log_num_spanning_trees
 from .signatures.spanning_trees import spanning_tree_signature as spanning_tree_signature
 from .signatures.von_neumann import von_neumann_entropy as von_neumann_entropy

@@ -12,3 +12,16 @@ def counted(count: int, noun: str, plural: str = "") -> str:
     ('1 pose', '0 edges', '2 classes')
     """
     return f"{count} {noun if count == 1 else plural or noun + 's'}"
+
+
+def closures_in_words(number: int, expected: float, noun: str = "closure") -> str:
+    """How many closures there may be, and how many are expected where these are fewer than nineteen in twenty.
+
+    Examples
+    --------
+    >>> closures_in_words(12, 12.0), closures_in_words(40, 2.3)
+    ('12 closures', '2.3 of 40 possible closures')
+    """
+    if expected >= 0.95 * number:
+        return counted(number, noun)
+    return f"{expected:.1f} of {counted(number, f'possible {noun}')}"

@@ -12,7 +12,7 @@ from typing import get_args
 import pytest
 
 from topobelief.bounds.entropy_bounds import Determinant
-from topobelief.cli import app, main, plan, plan_stages, reading
+from topobelief.cli import app, main, plan_candidates, plan_options, reading
 from topobelief.io import reading as io_reading
 from topobelief.io import ros_map
 from topobelief.planning import planner
@@ -46,7 +46,7 @@ def test_help_is_whole_in_a_terminal_of_80_columns(topobelief, monkeypatch, comm
     assert not re.search(r"[\w-]…", shown)
     words = set(re.split(r"[\s,;:.]+", shown))
     if command == "plan":
-        kinds = (plan.Determinant, plan.Proof, plan.Unknown)
+        kinds = (plan_options.Determinant, plan_options.Proof, plan_options.Unknown)
         assert {"--no-line-of-sight", "--allow-dense-spectrum", "--max-evaluations"} <= words
         assert {choice for kind in kinds for choice in get_args(kind)} <= words
         assert {*OBJECTIVES, *SIGNATURES, *BOUNDS, AUTO} <= words
@@ -86,9 +86,9 @@ def test_the_entry_point_exits_with_the_code(capsys):
 @pytest.mark.parametrize(
     ("offered", "known"),
     [
-        (plan.Determinant, get_args(Determinant)),
-        (plan.Proof, get_args(planner.Proof)),
-        (plan.Unknown, get_args(ros_map.Unknown)),
+        (plan_options.Determinant, get_args(Determinant)),
+        (plan_options.Proof, get_args(planner.Proof)),
+        (plan_options.Unknown, get_args(ros_map.Unknown)),
         (reading.Edge2Order, get_args(io_reading.Edge2Order)),
     ],
 )
@@ -115,7 +115,7 @@ def test_an_interrupt_is_one_line_and_leaves_no_file(topobelief, office, tmp_pat
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(plan_stages, "find_candidates", interrupted)
+    monkeypatch.setattr(plan_candidates, "find_candidates", interrupted)
     outcome = topobelief(office.plan("--out", "result"))
     assert outcome.code == app.INTERRUPTED
     assert outcome.err == "topobelief: interrupted; nothing was left half-written\n"
@@ -123,7 +123,7 @@ def test_an_interrupt_is_one_line_and_leaves_no_file(topobelief, office, tmp_pat
 
 
 def test_a_bug_keeps_its_traceback(topobelief, office, monkeypatch):
-    monkeypatch.setattr(plan_stages, "find_candidates", lambda *_: 1 / 0)
+    monkeypatch.setattr(plan_candidates, "find_candidates", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         topobelief(office.plan())
 

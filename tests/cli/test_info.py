@@ -149,3 +149,54 @@ def test_a_crowd_of_components_is_cut_short(topobelief, tmp_path):
     assert "1 edge, a tree" in output
     assert output.splitlines()[-1].split() == ["and", "smaller", "ones", "2"]
     assert len(facts(topobelief, tmp_path / "crowd.g2o")["components"]) == 12
+
+
+def test_extents_are_those_of_the_poses_that_a_plan_starts_from(topobelief, office):
+    graph = optimize(read_g2o(office.graph_file))
+    found = facts(topobelief, office.graph_file)["extent"]
+    assert found == np.stack([graph.positions.min(axis=0), graph.positions.max(axis=0)], axis=1).tolist()
+    assert facts(topobelief, office.graph_file, "--no-optimize")["extent"] == [[0, 10], [0, 10]]
+    assert (
+        "x 0.0 … 10.0 m, y 0.0 … 10.0 m, at the poses as filed"
+        in topobelief(["info", str(office.graph_file), "--no-optimize"]).out
+    )
+
+
+def test_the_graph_is_drawn(topobelief, office, tmp_path):
+    outcome = topobelief(["info", str(office.graph_file), "--picture", "graph.png", "--map", str(office.map_file)])
+    assert outcome.code == 0
+    assert "Picture: graph.png" in outcome.out
+    assert (tmp_path / "graph.png").read_bytes().startswith(b"\x89PNG")
+    assert [path.name for path in tmp_path.iterdir()] == ["graph.png"]
+
+
+def test_a_graph_in_space_and_one_in_parts_are_drawn_too(topobelief, tmp_path):
+    (tmp_path / "parts.g2o").write_text(PARTS)
+    for arguments in ([str(data_file("smallGrid3D.g2o"))], ["parts.g2o", "--drop", "priors"]):
+        assert topobelief(["info", *arguments, "--no-optimize", "--picture", "graph.svg"]).code == 0
+        assert "<svg" in (tmp_path / "graph.svg").read_text()
+
+
+def test_goals_are_judged_and_the_nearest_free_place_is_one(topobelief, office):
+    places = ["--goal", "5", "4.5", "--goal", "3", "--goal", "20", "5"]
+    found = facts(topobelief, office.graph_file, "--map", office.map_file, "--no-optimize", *places)["goals"]
+    assert [goal["free"] for goal in found] == [False, True, False]
+    assert [goal["nearest_free"] for goal in found] == [[5.0, 2.64], [3.0, 0.0], [10.44, 5.0]]
+    again = ["--goal", *map(str, found[0]["nearest_free"]), "--goal", *map(str, found[2]["nearest_free"])]
+    assert all(goal["free"] for goal in facts(topobelief, office.graph_file, "--map", office.map_file, *again)["goals"])
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--picture", "graph.bmp"], "graph.bmp: expected a picture that ends in .png, .pdf or .svg, got .bmp"),
+        (["--picture", "no/graph.png"], "no/graph.png: expected a file to write, got a folder that does not exist"),
+        (["--goal", "77"], "expected --goal as the id of a pose of the file (from 0 to 20) or as X Y, got 77"),
+        (["--goal", "1", "2", "--map", "none.csv"], "none.csv: expected a file to read, got nothing of that name"),
+    ],
+)
+def test_what_cannot_be_is_refused(topobelief, office, tmp_path, options, message):
+    outcome = topobelief(["info", str(office.graph_file), *options])
+    assert (outcome.code, outcome.err.count("\n")) == (2, 1)
+    assert message in outcome.err
+    assert list(tmp_path.iterdir()) == []

@@ -219,7 +219,7 @@ class TestErrors:
             (b"image: a\nresolution: [1\n", r"map\.yaml:3: expected YAML"),
             (b"image: \x07\n", "expected YAML"),
             (b"[" * 20000, "expected YAML, got brackets nested too deeply"),
-            (b"image: a\n---\nimage: b\n", "expected a single document in the stream but found another document"),
+            (b"image: a\n---\nimage: b\n", r"map\.yaml:3: expected one document, got a second one"),
         ],
     )
     def test_what_is_no_yaml_mapping_is_refused(self, tmp_path: Path, content: bytes, message: str) -> None:

@@ -119,6 +119,16 @@ def test_text_and_html_show_the_same_cells():
     assert f"<p>{decision.summary()}</p>" in html
 
 
+def test_of_many_actions_html_shows_the_first_and_the_best():
+    """The best is not the first of the ranking once exact values are known."""
+    decision = replace(Planner(LINE).decide([EXPLORE] * 40), best=39)
+    html = decision._repr_html_()
+    assert html.count("<td") == 31 * len(decision_table(decision).columns)
+    assert html.count("font-weight: bold") == 1
+    assert "9 more actions in print(decision)." in html
+    assert len(str(decision).splitlines()) == 2 + 1 + 40 + 3
+
+
 def test_labels_are_text_in_html_too():
     decision = Planner(LINE).decide([Action([[5, 0, 0]], [(4, 5)], OMEGA, label="<b>")])
     assert "&lt;b&gt;" in decision._repr_html_()

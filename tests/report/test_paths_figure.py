@@ -80,12 +80,12 @@ def test_of_many_closures_the_two_shortest_of_each_new_pose_are_drawn(scene):
     assert "its predicted closures (3 of 5)" in {text.get_text() for text in figure.legends[0].get_texts()}
 
 
-def test_stretches_are_named_by_ids_those_with_most_poses_first():
+def test_stretches_are_named_by_ids_those_with_most_closures_first():
     graph = PoseGraph([[x, 0, 0] for x in range(20)], [(x, x + 1) for x in range(19)], None, OMEGA, ids=range(100, 120))
     action = Action([(0, 1, 0)], [(19, 20), *((20, seen) for seen in (0, 4, 6, 9, 15, 16))], OMEGA)
     sight = Sight.of(graph, find_start(graph), action)
     assert sight.seen.tolist() == [0, 4, 6, 9, 15, 16]
-    assert sight.stretches(graph) == [("104", "109"), ("115", "116"), ("100", "100")]
+    assert [stretch.name(graph) for stretch in sight.stretches] == ["104 to 109", "115 to 116", "100"]
 
 
 def test_the_key_counts_survivors_and_ruled_out(scene):

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from topobelief.arrays import FloatArray, frozen_floats
 from topobelief.errors import InvalidInputError
+from topobelief.geometry.planar import travel_headings
 
 _TINY = np.finfo(float).tiny
 
@@ -81,9 +82,7 @@ def path_poses(path: ArrayLike) -> FloatArray:
     [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [2.0, 1.0, 1.571]]
     """
     waypoints = checked_path(path)
-    if len(waypoints) == 1:
-        return np.column_stack([waypoints, np.zeros(1)])
-    return np.column_stack([waypoints, stations(waypoints, _lengths_so_far(waypoints)).headings])
+    return np.column_stack([waypoints, travel_headings(waypoints)])
 
 
 def sampled(path: FloatArray, count: int) -> FloatArray:

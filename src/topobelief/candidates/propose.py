@@ -7,6 +7,7 @@ report between the two.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -161,9 +162,16 @@ def predict_candidates(
     graph: PoseGraph, world: World, routes: Routes, rule: CandidateRule, *, start: Start | None = None
 ) -> Candidates:
     """The factors of `propose` along paths that were found before; they join the last pose unless there is a start."""
-    actions = predict_actions(
+    return Candidates(routes, predict_along(graph, world, routes.paths, rule, start=start))
+
+
+def predict_along(
+    graph: PoseGraph, world: World, paths: Sequence[ArrayLike], rule: CandidateRule, *, start: Start | None = None
+) -> list[Action]:
+    """As `predict_candidates`, along paths of any origin, each of shape (waypoints, 2)."""
+    return predict_actions(
         graph,
-        routes.paths,
+        paths,
         information=rule.information,
         spacing=rule.spacing,
         turn=rule.turn,
@@ -171,4 +179,3 @@ def predict_candidates(
         world=world if rule.line_of_sight else None,
         start=start,
     )
-    return Candidates(routes, actions)

@@ -31,6 +31,7 @@ from topobelief.candidates.passages import find_passages
 from topobelief.errors import InvalidInputError, InvalidMapError, PlanningError, require_positive
 from topobelief.wording import counted
 from topobelief.world import World, shapes
+from topobelief.world.free_places import nearest_free_place
 
 _dijkstra = cast("Any", dijkstra)  # whose stub refuses one index
 _FEW_NEIGHBOURS = 64  # of each corner, tried first
@@ -242,23 +243,33 @@ def checked_ends(world: World, start: ArrayLike, goal: ArrayLike, robot_radius: 
     """
     require_positive("a robot radius", robot_radius, unit="m")
     ends = np.stack([_checked_place(start, "start"), _checked_place(goal, "goal")])
-    for name, place, clearance in zip(("start", "goal"), ends, world.clearance(ends).tolist(), strict=True):
-        x_min, y_min, x_max, y_max = world.bounds
-        x, y = place.tolist()
-        if not (x_min <= x <= x_max and y_min <= y <= y_max):
-            raise PlanningError(
-                f"expected a {name} on the map, x {x_min:g} to {x_max:g} and y {y_min:g} to {y_max:g}, got {_place(place)}; "
-                "choose a place on the map"
-            )
-        if clearance <= robot_radius:
-            where = "in an obstacle or unknown space" if clearance <= 0 else f"{clearance:.2f} m from the nearest obstacle"
-            raise PlanningError(
-                f"expected a {name} with more clearance than the robot's radius of {robot_radius:g} m, "
-                f"got {_place(place)}, {where}; choose a place in the open or a smaller radius"
-            )
+    _require_room(world, "start", ends[0], robot_radius)
+    _require_room(world, "goal", ends[1], robot_radius, reachable_from=ends[0])
     if np.linalg.norm(ends[1] - ends[0]) <= _SAME_PLACE:
         raise PlanningError(f"expected a goal away from the start, got {_place(ends[1])} for both; choose another goal")
     return ends
+
+
+def _require_room(
+    world: World, name: str, place: FloatArray, robot_radius: float, *, reachable_from: FloatArray | None = None
+) -> None:
+    """Raise where a place is out of bounds or in collision; names the nearest one that is not."""
+    x_min, y_min, x_max, y_max = world.bounds
+    (x, y), clearance = place.tolist(), float(world.clearance(place[None])[0])
+    if x_min <= x <= x_max and y_min <= y <= y_max:
+        if clearance > robot_radius:
+            return
+        where = "in an obstacle or unknown space" if clearance <= 0 else f"{clearance:.2f} m from the nearest obstacle"
+        problem = f"with more clearance than the robot's radius of {robot_radius:g} m, got {_place(place)}, {where}"
+    else:
+        problem = f"on the map, x {x_min:g} to {x_max:g} and y {y_min:g} to {y_max:g}, got {_place(place)}"
+    nearest = nearest_free_place(world, place, robot_radius, reachable_from=reachable_from)
+    if nearest is None:
+        advice = "choose a smaller radius: there is no room for the robot anywhere"
+    else:
+        x, y = nearest.tolist()
+        advice = f"choose the nearest free place, {x:g} {y:g}, {np.linalg.norm(nearest - place):.2f} m away"
+    raise PlanningError(f"expected a {name} {problem}; {advice}")
 
 
 def _checked_place(place: ArrayLike, name: str) -> FloatArray:

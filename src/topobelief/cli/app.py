@@ -10,7 +10,7 @@ from typing import Annotated, cast
 import typer
 
 from topobelief.cli.benchmark import benchmark
-from topobelief.cli.command import Command, StartCommand
+from topobelief.cli.command import Command, PlaceCommand
 from topobelief.cli.info import info
 from topobelief.cli.plan import plan
 from topobelief.cli.reproduce import reproduce
@@ -25,8 +25,8 @@ INTERRUPTED = 130
 _UsageError = cast("type[Exception]", typer.BadParameter.__mro__[1])
 
 app = typer.Typer(name="topobelief", pretty_exceptions_enable=False)
-app.command(cls=StartCommand)(plan)
-app.command(cls=Command)(info)
+app.command(cls=PlaceCommand)(plan)
+app.command(cls=PlaceCommand)(info)
 app.command(cls=Command)(benchmark)
 app.command(cls=Command)(reproduce)
 app.command(cls=Command)(simulate)

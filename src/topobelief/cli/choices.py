@@ -7,12 +7,12 @@ from collections.abc import Callable, Iterable
 import typer
 
 
-def one_of(names: Iterable[str]) -> Callable[[str], str]:
-    """A callback that lets one of these names through."""
+def one_of(names: Iterable[str]) -> Callable[[str | None], str | None]:
+    """A callback that lets one of these names through, and None where none is given."""
     known = tuple(names)
 
-    def checked(value: str) -> str:
-        if value not in known:
+    def checked(value: str | None) -> str | None:
+        if value is not None and value not in known:
             raise typer.BadParameter(f"{value!r} is not one of {', '.join(map(repr, known))}.")
         return value
 

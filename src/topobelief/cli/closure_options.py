@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
 
 from topobelief.candidates.closures import ClosureModel
 from topobelief.candidates.learned_closures import learn_closures
-from topobelief.candidates.propose import CandidateRule
 from topobelief.cli.console import Reporter
+from topobelief.cli.plan_options import Closures
 from topobelief.errors import InvalidInputError
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.world import World
-
-Closures = Literal["learned", "paper", "by-hand"]
 
 
 def stated_closures(
@@ -48,9 +45,10 @@ def stated_closures(
     return replace(ClosureModel.paper() if name == "paper" else ClosureModel.by_hand(), **given)
 
 
-def with_closures(rule: CandidateRule, graph: PoseGraph, world: World, reporter: Reporter) -> CandidateRule:
-    """The rule with its closure model, learned where none is stated; told in one line."""
-    seen_in = world if rule.line_of_sight else None
-    model = rule.closures if rule.closures is not None else learn_closures(graph, world=seen_in)
+def told_closures(
+    stated: ClosureModel | None, graph: PoseGraph, world: World, reporter: Reporter, *, line_of_sight: bool
+) -> ClosureModel:
+    """The closure model, learned from the graph where none is stated; told in one line."""
+    model = stated if stated is not None else learn_closures(graph, world=world if line_of_sight else None)
     reporter.say(str(model))
-    return replace(rule, closures=model)
+    return model

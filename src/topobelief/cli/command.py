@@ -1,4 +1,4 @@
-"""How a command line is read: no option is silently dropped, and some take one value or two."""
+"""How a command line is read: no option is silently dropped, and places take one value or two."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ class Command(TyperCommand):
         return super().parse_args(ctx, args)
 
 
-class StartCommand(Command):
-    """A command whose option --start takes one number or two."""
+class PlaceCommand(Command):
+    """A command whose options --start and --goal take one number or two."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse as usual, two numbers after --start taken as one value."""
-        return super().parse_args(ctx, _pairs_joined(args, "--start"))
+        """Parse as usual, two numbers after --start or --goal taken as one value."""
+        return super().parse_args(ctx, _pairs_joined(_pairs_joined(args, "--start"), "--goal"))
 
 
 def _pairs_joined(args: list[str], option: str) -> list[str]:

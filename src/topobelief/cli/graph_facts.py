@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,7 +38,7 @@ _BOUNDS: tuple[tuple[Family, Determinant], ...] = (
 
 _MOST_COMPONENTS = 10  # listed for a person
 
-Value = str | int | float | None | dict[str, float] | list[int] | list[dict[str, int | float | None]]
+Value = str | int | float | None | dict[str, float] | Sequence[int | Sequence[float] | Mapping[str, object]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,9 +53,10 @@ class Fact:
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """Facts in groups, each with a heading."""
+    """Facts in groups, each with a heading, and the graph at the poses that they are about."""
 
     groups: dict[str, list[Fact]]
+    graph: PoseGraph
 
     def tables(self) -> list[Table]:
         """For a person."""
@@ -83,20 +84,22 @@ def describe(path: Path, reporter: Reporter, *, optimized: bool, reading: Readin
     if filed.topology.num_components > 1:
         return Facts(
             {
-                str(path): [Fact("file", str(path), "", ""), *_size(filed)],
+                str(path): [Fact("file", str(path), "", ""), *_size(filed), _extent(filed, "as filed")],
                 "Components; for fit, signatures and uncertainty of one, pass --component": list(_components(filed)),
-            }
+            },
+            filed,
         )
     graph = estimated(filed, reporter, optimized=optimized).graph
     at = "at the optimised poses" if optimized else "at the poses as filed"
     with reporter.stage("quantities"):
         return Facts(
             {
-                str(path): [Fact("file", str(path), "", ""), *_size(filed)],
+                str(path): [Fact("file", str(path), "", ""), *_size(filed), _extent(graph, at)],
                 "Fit": list(_fit(filed, graph, optimized=optimized)),
                 "Topology": list(_topology(graph)),
                 f"Uncertainty {at}": list(_uncertainty(graph)),
-            }
+            },
+            graph,
         )
 
 
@@ -121,6 +124,12 @@ def _size(graph: PoseGraph) -> Iterator[Fact]:
     yield Fact("num_components", parts, "connectivity", "connected" if parts == 1 else f"{parts} components")
     yield Fact("length", float(steps.sum()), "length from pose to pose", f"{steps.sum():.1f} m as filed")
     yield Fact("noise", _noise(graph), "noise", _noise(graph))
+
+
+def _extent(graph: PoseGraph, at: str) -> Fact:
+    low, high = graph.positions.min(axis=0).tolist(), graph.positions.max(axis=0).tolist()
+    spans = [f"{axis} {a:.1f} … {b:.1f} m" for axis, a, b in zip("xyz", low, high, strict=False)]
+    return Fact("extent", [[a, b] for a, b in zip(low, high, strict=True)], "extent", f"{', '.join(spans)}, {at}")
 
 
 def _components(graph: PoseGraph) -> Iterator[Fact]:

@@ -7,15 +7,56 @@ from typing import Annotated
 
 import typer
 
+from topobelief.cli import plan_arguments as values
+from topobelief.cli import plan_options as options
+from topobelief.cli.plan_arguments import GivenPlace
 from topobelief.cli.reading import Component, Drop, Edge2OrderOption, Planar, RobustAsPlain, reading_options
+
+_PLACES = "Goals and picture"
+
+Goals = Annotated[
+    list[GivenPlace] | None,
+    typer.Option(
+        "--goal",
+        metavar="ID | X Y",
+        parser=values.place,
+        help="Say whether this place is free, and where the nearest free one is; may be repeated.",
+        show_default=False,
+        rich_help_panel=_PLACES,
+    ),
+]
+MapFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--map",
+        metavar="FILE",
+        help="ROS map (.yaml) or walls (.csv), for goals and picture.",
+        show_default="what lies along the trajectory",
+        rich_help_panel=_PLACES,
+    ),
+]
+RobotRadius = Annotated[float, typer.Option(metavar="M", help="Metres.", callback=values.above_zero, rich_help_panel=_PLACES)]
+Picture = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="Draw the graph: .png, .pdf or .svg.",
+        show_default=False,
+        rich_help_panel=_PLACES,
+    ),
+]
 
 
 def info(
-    graph_file: Annotated[Path, typer.Argument(metavar="GRAPH", help="Pose graph in g2o or TORO format.")],
+    graph_file: options.GraphFile,
     optimize: Annotated[
         bool,
         typer.Option("--optimize/--no-optimize", help="Evaluate it at its maximum-likelihood poses, or at those in the file."),
     ] = True,
+    goal: Goals = None,
+    map_file: MapFile = None,
+    robot_radius: RobotRadius = 0.35,
+    picture: Picture = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")] = False,
     drop: Drop = None,
     robust_as_plain: RobustAsPlain = False,
@@ -28,10 +69,25 @@ def info(
 
     reporter = Reporter(as_json=as_json)
     with reporter.stage("start-up"):
-        from topobelief.cli.graph_facts import describe
+        from topobelief.cli import graph_facts, graph_picture
+    graph_picture.check_picture_file(picture)
     reading = reading_options(
         drop, robust_as_plain=robust_as_plain, edge2_order=edge2_order, component=component, planar=planar
     )
-    facts = describe(graph_file, reporter, optimized=optimize, reading=reading)
+    facts = graph_facts.describe(graph_file, reporter, optimized=optimize, reading=reading)
+    world = None
+    if goal or map_file is not None:
+        from topobelief.cli.goal_facts import describe_goals
+        from topobelief.cli.plan_ends import choose_goals
+        from topobelief.cli.plan_world import read_world
+
+        world = read_world(map_file, facts.graph, reporter)
+        goals = choose_goals(facts.graph, goal or ())
+        if goals:
+            facts.groups["Goals"] = list(describe_goals(facts.graph, world, goals, robot_radius))
+    if picture is not None:
+        graph_picture.write(picture, facts.graph, graph_file.name, world, reporter)
     reporter.say(*facts.tables())
+    if picture is not None:
+        reporter.say(f"Picture: {picture}")
     reporter.answer(facts.document() | {"notes": reporter.notes})

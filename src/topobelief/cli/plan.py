@@ -3,355 +3,58 @@
 from __future__ import annotations
 
 import math
-import re
 import warnings
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Literal
 
 import typer
 
-from topobelief.cli.choices import completed, one_of
+from topobelief.cli import plan_options as options
 from topobelief.cli.reading import Component, Drop, Edge2OrderOption, Planar, RobustAsPlain, reading_options
-from topobelief.errors import NotOptimizedWarning, degrees_hint
-from topobelief.planning.registry import AUTO, BOUNDS, OBJECTIVES, SIGNATURES
-
-# The planner's own choices, repeated so that help need not load it; a test holds them together.
-Determinant = Literal["cholesky", "hadamard"]
-Proof = Literal["none", "bounded", "optimal"]
-Unknown = Literal["occupied", "free"]
-Closures = Literal["learned", "paper", "by-hand"]
-
-_WORLD = "Where the robot may drive"
-_CANDIDATES = "Candidate paths"
-_FACTORS = "Predicted factors"
-_RULES = "Rules of predicted loop closures"
-_DECISION = "Decision"
-_PROOF = "Bounds and proof"
-_OUTPUT = "Output"
-
-_UNIFORM_STD = math.pi / math.sqrt(3)  # radians, of a heading of which nothing is known
-
-
-@dataclass(frozen=True, slots=True)
-class GivenStart:
-    """Where the robot stands, as given: the id of a pose (12, or a symbol such as x3), or a place."""
-
-    pose_id: str | None = None
-    place: tuple[float, float] | None = None
-
-    def __str__(self) -> str:
-        return str(self.pose_id) if self.place is None else f"{self.place[0]:g} {self.place[1]:g}"
-
-
-def _start(text: str) -> GivenStart:
-    words = text.split()
-    try:
-        if len(words) == 1:
-            if not re.fullmatch(r"-?\d+|[A-Za-z]{1,2}\d+", words[0]):
-                raise ValueError
-            return GivenStart(pose_id=words[0])
-        x, y = map(float, words)
-        if math.isfinite(x) and math.isfinite(y):
-            return GivenStart(place=(x, y))
-    except ValueError:
-        pass
-    raise typer.BadParameter(f"expected the id of a pose or X Y in metres, got {text!r}.")
-
-
-def _above_zero(value: float | None) -> float | None:
-    if value is not None and not 0 < value < math.inf:
-        raise typer.BadParameter(f"expected a number above 0, got {value:g}.")
-    return value
-
-
-def _angle(value: float | None) -> float | None:
-    return _radians(value, math.pi)
-
-
-def _heading_noise(value: float | None) -> float | None:
-    return _radians(value, _UNIFORM_STD)
-
-
-def _radians(value: float | None, largest: float) -> float | None:
-    value = _above_zero(value)
-    if value is not None and value > largest:
-        raise typer.BadParameter(f"expected at most {largest:.6g}, got {value:g}{degrees_hint(value)}.")
-    return value
-
-
-def _finite(value: tuple[float, float]) -> tuple[float, float]:
-    if not all(map(math.isfinite, value)):
-        raise typer.BadParameter(f"expected two finite numbers, got {value[0]:g} {value[1]:g}.")
-    return value
-
-
-def _detour(text: str) -> float:
-    """The detour limit; infinite for "none" and 0."""
-    try:
-        limit = math.inf if text.lower() in ("none", "inf") else float(text)
-    except ValueError:
-        limit = math.nan
-    if limit == 0:
-        return math.inf
-    if not limit >= 1:
-        raise typer.BadParameter(f'expected a factor of at least 1, or "none", got {text!r}.')
-    return limit
+from topobelief.errors import NotOptimizedWarning
 
 
 def plan(
     context: typer.Context,
-    graph_file: Annotated[Path, typer.Argument(metavar="GRAPH", help="Pose graph in g2o or TORO format.")],
-    goal: Annotated[tuple[float, float], typer.Option(metavar="X Y", help="The goal, metres.", callback=_finite)],
-    start: Annotated[
-        GivenStart | None,
-        typer.Option(
-            metavar="ID | X Y",
-            parser=_start,
-            help="Where the robot starts: id of a pose, or X Y in metres.",
-            show_default="the last pose",
-        ),
-    ] = None,
-    map_file: Annotated[
-        Path | None,
-        typer.Option("--map", metavar="FILE", help="ROS map (.yaml) or walls (.csv).", rich_help_panel=_WORLD),
-    ] = None,
-    along_trajectory: Annotated[
-        bool,
-        typer.Option(
-            "--along-trajectory",
-            metavar="",
-            help="Use no map: where the robot has been counts as free.",
-            rich_help_panel=_WORLD,
-        ),
-    ] = False,
-    width: Annotated[
-        float | None,
-        typer.Option(
-            metavar="M",
-            help="Free width on each side of the trajectory, metres.",
-            show_default="twice its typical step",
-            callback=_above_zero,
-            rich_help_panel=_WORLD,
-        ),
-    ] = None,
-    unknown: Annotated[
-        Unknown,
-        typer.Option(metavar="WHAT", help="Treat unknown cells of a ROS map as occupied or free.", rich_help_panel=_WORLD),
-    ] = "occupied",
-    robot_radius: Annotated[
-        float, typer.Option(metavar="M", help="Metres.", callback=_above_zero, rich_help_panel=_WORLD)
-    ] = 0.35,
-    candidates: Annotated[
-        int, typer.Option(min=1, metavar="N", help="Number of paths to compare.", rich_help_panel=_CANDIDATES)
-    ] = 20,
-    max_detour: Annotated[
-        float | None,
-        typer.Option(
-            metavar="FACTOR",
-            parser=_detour,
-            help='Longest path, as a multiple of the shortest; "none" or 0 for no limit.',
-            show_default="1.3",
-            rich_help_panel=_CANDIDATES,
-        ),
-    ] = None,
-    vertices: Annotated[
-        int, typer.Option(min=2, metavar="N", help="Minimum number of roadmap vertices.", rich_help_panel=_CANDIDATES)
-    ] = 1000,
-    seed: Annotated[
-        int,
-        typer.Option(min=0, metavar="N", help="Random seed; the same seed gives the same paths.", rich_help_panel=_CANDIDATES),
-    ] = 0,
-    spacing: Annotated[
-        float, typer.Option(metavar="M", help="Metres between new poses.", callback=_above_zero, rich_help_panel=_FACTORS)
-    ] = 1.0,
-    closures: Annotated[
-        Closures | None,
-        typer.Option(
-            metavar="NAME",
-            help="Which loops close: learned from the graph, the rule of the paper, or by-hand, as the next three say.",
-            show_default="learned",
-            rich_help_panel=_FACTORS,
-        ),
-    ] = None,
-    closure_radius: Annotated[
-        float | None,
-        typer.Option(
-            metavar="M",
-            help="By hand: loops close with all poses within this distance, metres.",
-            show_default="2",
-            callback=_above_zero,
-            rich_help_panel=_FACTORS,
-        ),
-    ] = None,
-    closure_angle: Annotated[
-        float | None,
-        typer.Option(
-            metavar="RAD",
-            help="… and within this difference of headings, radians.",
-            show_default="any",
-            callback=_angle,
-            rich_help_panel=_FACTORS,
-        ),
-    ] = None,
-    min_index_gap: Annotated[
-        int | None,
-        typer.Option(
-            min=2,
-            metavar="N",
-            help="… and with a pose at least this many poses earlier.",
-            show_default="5",
-            rich_help_panel=_FACTORS,
-        ),
-    ] = None,
-    sigma_p: Annotated[
-        float | None,
-        typer.Option(
-            metavar="M",
-            help="Noise of predicted positions, metres.",
-            show_default="the graph's",
-            callback=_above_zero,
-            rich_help_panel=_FACTORS,
-        ),
-    ] = None,
-    sigma_theta: Annotated[
-        float | None,
-        typer.Option(
-            metavar="RAD",
-            help="Noise of predicted headings, radians.",
-            show_default="the graph's",
-            callback=_heading_noise,
-            rich_help_panel=_FACTORS,
-        ),
-    ] = None,
-    line_of_sight: Annotated[
-        bool | None,
-        typer.Option(
-            "--line-of-sight/--no-line-of-sight",
-            metavar="",
-            help="Close loops only with poses in line of sight.",
-            show_default="yes",
-            rich_help_panel=_RULES,
-        ),
-    ] = None,
-    paper: Annotated[
-        bool,
-        typer.Option(
-            "--paper",
-            metavar="",
-            help="Use the rules of the paper unless other options are given: headings within 1 rad, index gap 2, "
-            "no line of sight, no detour limit.",
-            rich_help_panel=_RULES,
-        ),
-    ] = False,
-    objective: Annotated[
-        str,
-        typer.Option(
-            callback=one_of(OBJECTIVES),
-            autocompletion=completed(OBJECTIVES),
-            metavar="NAME",
-            help="Entropy to minimise: joint, of all poses (the paper's); map, of existing poses; or per_pose.",
-            rich_help_panel=_DECISION,
-        ),
-    ] = "joint",
-    signature: Annotated[
-        str,
-        typer.Option(
-            callback=one_of(SIGNATURES),
-            autocompletion=completed(SIGNATURES),
-            metavar="NAME",
-            help="Signature that ranks paths: spanning_trees, von_neumann or von_neumann_approx.",
-            rich_help_panel=_DECISION,
-        ),
-    ] = "spanning_trees",
-    normalized: Annotated[
-        bool,
-        typer.Option("--normalized", metavar="", help="Add a noise term to von_neumann_approx.", rich_help_panel=_DECISION),
-    ] = False,
-    allow_dense_spectrum: Annotated[
-        bool,
-        typer.Option(
-            "--allow-dense-spectrum",
-            metavar="",
-            help="Allow von_neumann on large graphs, which is slow.",
-            rich_help_panel=_DECISION,
-        ),
-    ] = False,
-    margin: Annotated[
-        float | None,
-        typer.Option(
-            metavar="NATS",
-            help="Accept a path with at most this entropy, without bounding the others.",
-            rich_help_panel=_DECISION,
-        ),
-    ] = None,
-    deadline: Annotated[
-        float | None,
-        typer.Option(
-            metavar="S", help="Time limit for the decision, seconds.", callback=_above_zero, rich_help_panel=_DECISION
-        ),
-    ] = None,
-    bounds: Annotated[
-        str,
-        typer.Option(
-            callback=one_of((*BOUNDS, AUTO)),
-            autocompletion=completed((*BOUNDS, AUTO)),
-            metavar="NAME",
-            help="Family of bounds: fischer; fischer_step, tighter; paper, for equal noise; anchored and chain, tightest; "
-            "auto, what proves for less.",
-            rich_help_panel=_PROOF,
-        ),
-    ] = "fischer",
-    determinant: Annotated[
-        Determinant,
-        typer.Option(
-            metavar="NAME",
-            help="Determinant in the lower bound: cholesky (exact) or hadamard (from diagonal).",
-            rich_help_panel=_PROOF,
-        ),
-    ] = "cholesky",
-    proof: Annotated[
-        Proof,
-        typer.Option(
-            metavar="NAME",
-            help="none: ranking only; bounded; or optimal: exact evaluations until proven.",
-            rich_help_panel=_PROOF,
-        ),
-    ] = "bounded",
-    max_evaluations: Annotated[
-        int | None,
-        typer.Option(min=0, metavar="N", help="Maximum number of exact evaluations.", rich_help_panel=_PROOF),
-    ] = None,
-    optimize: Annotated[
-        bool,
-        typer.Option(
-            "--optimize/--no-optimize",
-            metavar="",
-            help="Compute the maximum-likelihood poses first.",
-        ),
-    ] = True,
-    exact: Annotated[
-        bool,
-        typer.Option(
-            "--exact/--no-exact",
-            metavar="",
-            help="Evaluate every path for the bounds picture, for a few seconds at most.",
-            rich_help_panel=_OUTPUT,
-        ),
-    ] = True,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FOLDER",
-            help="Folder for paths.png, bounds.png and decision.json.",
-            show_default="out; with --json, none",
-            rich_help_panel=_OUTPUT,
-        ),
-    ] = None,
-    as_json: Annotated[
-        bool,
-        typer.Option("--json", metavar="", help="Print the decision as JSON and nothing else.", rich_help_panel=_OUTPUT),
-    ] = False,
+    graph_file: options.GraphFile,
+    goal: options.Goals = None,
+    start: options.Start = None,
+    map_file: options.MapFile = None,
+    along_trajectory: options.AlongTrajectory = False,
+    width: options.Width = None,
+    unknown: options.UnknownCells = "occupied",
+    robot_radius: options.RobotRadius = 0.35,
+    path: options.PathFiles = None,
+    candidates: options.NumCandidates = 20,
+    max_detour: options.MaxDetour = None,
+    vertices: options.Vertices = 1000,
+    seed: options.Seed = 0,
+    spacing: options.Spacing = 1.0,
+    closures: options.ClosuresName = None,
+    closure_radius: options.ClosureRadius = None,
+    closure_angle: options.ClosureAngle = None,
+    min_index_gap: options.MinIndexGap = None,
+    line_of_sight: options.LineOfSight = None,
+    sigma_p: options.SigmaP = None,
+    sigma_theta: options.SigmaTheta = None,
+    objective: options.Objective = None,
+    signature: options.Signature = None,
+    cost_per_metre: options.CostPerMetre = 0.0,
+    as_paper: options.AsPaper = False,
+    normalized: options.Normalized = False,
+    allow_dense_spectrum: options.AllowDenseSpectrum = False,
+    margin: options.Margin = None,
+    deadline: options.Deadline = None,
+    bounds: options.BoundsName = None,
+    determinant: options.DeterminantName = "cholesky",
+    proof: options.ProofName = None,
+    max_evaluations: options.MaxEvaluations = None,
+    optimize: options.Optimize = True,
+    exact: options.Exact = True,
+    why: options.Why = None,
+    out: options.Out = None,
+    write_path: options.WritePath = None,
+    as_json: options.AsJson = False,
     drop: Drop = None,
     robust_as_plain: RobustAsPlain = False,
     edge2_order: Edge2OrderOption = "toro",
@@ -360,22 +63,39 @@ def plan(
 ) -> None:
     """Choose the best path to a goal on a pose-graph map.
 
-    Ranks diverse paths by a topological signature of the resulting graph, and bounds the loss of that choice.
+    Compares paths by how well the map would be known after each, and proves which is the best.
     """
     if (map_file is None) == (not along_trajectory):
         raise typer.BadParameter("expected one of --map FILE and --along-trajectory.", param_hint="the world")
+    if not goal and not path:
+        raise typer.BadParameter("expected --goal ID or X Y, or a candidate of your own by --path FILE.", param_hint="the goal")
     from topobelief.cli.console import Reporter
 
     reporter = Reporter(as_json=as_json)
     with reporter.stage("start-up"):
+        from topobelief.candidates.closure_rate import rate_warning
         from topobelief.candidates.predicted_factors import KEY_POSE_TURN
         from topobelief.candidates.propose import CandidateRule
-        from topobelief.cli import plan_files, plan_stages
-        from topobelief.cli.closure_options import stated_closures, with_closures
+        from topobelief.cli import (
+            plan_candidates,
+            plan_draws,
+            plan_ends,
+            plan_errors,
+            plan_files,
+            plan_reasons,
+            plan_stages,
+            plan_world,
+        )
+        from topobelief.cli.closure_options import stated_closures, told_closures
         from topobelief.planning.planner import Planner
 
     folder = plan_files.checked_folder(out if out is not None or as_json else Path("out"))
-    limit = max_detour if max_detour is not None else math.inf if paper else 1.3
+    path_file = plan_files.checked_path_file(write_path)
+    limit = max_detour if max_detour is not None else math.inf if as_paper else 1.3
+    objective = objective or ("joint" if as_paper else "error")
+    signature = signature or ("resistance" if objective == "error" else "spanning_trees")
+    bounds = bounds or ("fischer" if as_paper else "auto")
+    proof = proof or ("bounded" if as_paper or margin is not None else "optimal")
     rule = CandidateRule(
         num_paths=candidates,
         max_detour=limit if math.isfinite(limit) else None,
@@ -383,26 +103,26 @@ def plan(
         robot_radius=robot_radius,
         seed=seed,
         spacing=spacing,
-        turn=None if paper else KEY_POSE_TURN,
+        turn=None if as_paper else KEY_POSE_TURN,
         closures=stated_closures(
             closures,
-            paper=paper,
+            paper=as_paper,
             closure_radius=closure_radius,
             closure_angle=closure_angle,
             min_index_gap=min_index_gap,
         ),
-        line_of_sight=line_of_sight if line_of_sight is not None else not paper,
+        line_of_sight=line_of_sight if line_of_sight is not None else not as_paper,
         information=plan_stages.information(sigma_p, sigma_theta),
     )
     reading = reading_options(
         drop, robust_as_plain=robust_as_plain, edge2_order=edge2_order, component=component, planar=planar
     )
     graph = plan_stages.read_graph(graph_file, reporter, optimized=optimize, reading=reading)
-    world = plan_stages.read_world(map_file, graph, reporter, width=width, unknown=unknown)
-    rule = with_closures(rule, graph, world, reporter)
-    begin = plan_stages.choose_start(
-        graph, world, reporter, pose_id=start.pose_id if start else None, place=start.place if start else None
-    )
+    world = plan_world.read_world(map_file, graph, reporter, width=width, unknown=unknown)
+    begin = plan_ends.choose_start(graph, world, reporter, start)
+    goals = plan_ends.choose_goals(graph, goal or ())
+    model = told_closures(rule.closures, graph, world, reporter, line_of_sight=rule.line_of_sight)
+    rule = replace(rule, closures=model)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NotOptimizedWarning)  # `read_graph` has told
         planner = Planner(
@@ -414,7 +134,11 @@ def plan(
             normalized=normalized,
             allow_dense_spectrum=allow_dense_spectrum,
         )
-    found = plan_stages.find_candidates(graph, world, begin, goal, rule, reporter)
+    found = plan_candidates.find_proposals(
+        graph, world, begin, goals, path or (), rule, reporter, cost_per_metre=cost_per_metre
+    )
+    if warning := rate_warning(graph, model, found.actions):
+        reporter.note(warning)
     with reporter.stage("decision") as update:
         decision = planner.decide(
             found.actions,
@@ -424,20 +148,32 @@ def plan(
             deadline=deadline,
             on_progress=lambda _, done, total: update(done, total),
         )
-    plan_stages.say_decision(decision, rule, reporter, along_trajectory=along_trajectory)
+    explained = plan_reasons.asked_for(decision, why or ())
+    errors = plan_errors.expected(graph, found, decision, reporter)
+    reasons = plan_reasons.reasons(graph, begin, found, decision, errors)
+    answer = plan_errors.answer(found, decision, errors)
+    plan_stages.say_decision(decision, answer, rule, reporter, along_trajectory=along_trajectory)
+
+    def detailed(index: int) -> list[str]:
+        return plan_reasons.details(graph, begin, found, decision, index, reporter)
+
+    plan_reasons.say(reasons, decision, explained, detailed, reporter)
+    spreads = plan_draws.spreads(planner, found, decision, errors.shortest_path, reporter, seed=seed)
     entropies = plan_stages.exact_entropies(planner, found.actions, decision, reporter, wanted=exact and folder is not None)
     result = plan_files.PlanResult(
         graph=graph,
         world=world,
         start=begin,
-        candidates=found,
+        goals=goals,
+        proposals=found,
         decision=decision,
         entropies=entropies,
-        goal=goal,
+        errors=errors,
+        reasons=reasons,
+        spreads=spreads,
         rule=rule,
-        options=context.params,
+        options=context.params | {"objective": objective, "signature": signature, "bounds": bounds, "proof": proof},
         notes=reporter.notes,
     )
-    if folder is not None:
-        plan_files.write(folder, result, reporter)
+    plan_files.write(folder, path_file, result, reporter)
     reporter.answer(plan_files.document(result))

@@ -8,19 +8,25 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
 from topobelief.arrays import FloatArray
 from topobelief.candidates.polyline import path_length, path_poses
-from topobelief.candidates.propose import CandidateRule, Candidates
+from topobelief.candidates.propose import CandidateRule
 from topobelief.candidates.start import Start
 from topobelief.cli.console import Reporter
-from topobelief.cli.plan import GivenStart
+from topobelief.cli.plan_arguments import GivenPlace
+from topobelief.cli.plan_candidates import Proposals
+from topobelief.cli.plan_draws import Spread
+from topobelief.cli.plan_ends import Goal
+from topobelief.cli.plan_errors import PlanErrors
 from topobelief.errors import FileError
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.files import atomic_file
 from topobelief.io.json_values import without_nan
+from topobelief.io.path_formats import path_text, require_path_suffix
 from topobelief.planning.decision import Decision
 from topobelief.version import __version__
 from topobelief.world import World
@@ -33,10 +39,13 @@ class PlanResult:
     graph: PoseGraph
     world: World
     start: Start
-    candidates: Candidates
+    goals: Sequence[Goal]
+    proposals: Proposals
     decision: Decision
     entropies: FloatArray  # (K,): exact values, whether or not the decision needed them; nan where unknown
-    goal: tuple[float, float]
+    errors: PlanErrors
+    reasons: Sequence[str]  # K
+    spreads: Sequence[Spread]  # of the finalists
     rule: CandidateRule
     options: Mapping[str, object]  # as given, what the rule settles aside
     notes: Sequence[str]
@@ -62,14 +71,35 @@ def checked_folder(folder: Path | None) -> Path | None:
     return folder
 
 
+def checked_path_file(file: Path | None) -> Path | None:
+    """The file to write the chosen path to, before any work is done for it.
+
+    Raises
+    ------
+    FileError
+        Where no format has its suffix, or it could not be written.
+    """
+    if file is not None:
+        require_path_suffix(file)
+        if not file.absolute().parent.is_dir():
+            raise FileError(file, "expected a file to write, got a folder that does not exist; make it, or choose another file")
+        if file.is_dir() or not os.access(file if file.exists() else file.absolute().parent, os.W_OK):
+            raise FileError(file, "expected a file to write, got a folder or one without permission; choose another file")
+    return file
+
+
 def document(result: PlanResult) -> dict[str, object]:
     """The decision (`Decision.from_dict` reads it), with the paths and all that repeats the plan."""
     decision, graph, start = result.decision, result.graph, result.start
-    best = result.candidates.paths[decision.best]
+    paths, goals = result.proposals.paths, result.proposals.goals
     plain = decision.to_dict()
     exact = without_nan(result.entropies.tolist())
-    described = zip(plain["actions"], result.candidates.paths, exact, strict=True)
-    actions = [{**action, "waypoints": path.tolist(), "exact_for_comparison": value} for action, path, value in described]
+    described = zip(plain["actions"], paths, goals, exact, result.reasons, strict=True)
+    actions = [
+        {**action, "goal": goal, "waypoints": path.tolist(), "exact_for_comparison": value, "why": why}
+        for action, path, goal, value, why in described
+    ]
+    best = paths[decision.best]
     return {
         **plain,
         "actions": actions,
@@ -79,37 +109,54 @@ def document(result: PlanResult) -> dict[str, object]:
             "length": path_length(best),
             "x_y_yaw": path_poses(best).tolist(),
         },
+        "expected_errors": result.errors.document(),
+        "closure_draws": [asdict(spread) for spread in result.spreads],
         "notes": list(result.notes),
         "topobelief": __version__,
         "graph": {"num_poses": graph.num_poses, "num_edges": graph.num_edges, "chi2": graph.chi2},
         "start": (start.place if start.distance(graph) else graph.poses[start.pose]).tolist(),
         "start_pose": {"index": start.pose, "id": int(graph.ids[start.pose])},
-        "goal": list(result.goal),
+        "goals": [{"name": goal.name, "place": goal.place.tolist()} for goal in result.goals],
         "options": {name: _plain(value) for name, value in {**result.options, **asdict(result.rule)}.items()},
     }
 
 
 def _plain(value: object) -> object:
-    """For JSON: None for no limit, text for paths, lists for arrays."""
+    """For JSON: None for no limit, text for paths and places, lists for arrays, fields for models."""
     if isinstance(value, np.ndarray):
         return value.tolist()
-    return str(value) if isinstance(value, Path | GivenStart) else without_nan(value)
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in cast("Sequence[object]", value)]
+    return str(value) if isinstance(value, Path | GivenPlace) else without_nan(value)
 
 
-def write(folder: Path, result: PlanResult, reporter: Reporter) -> None:
-    """Draw and write everything, and say where it is and how long all took."""
-    text = json.dumps(document(result), indent=2, allow_nan=False) + "\n"
-    writers: dict[str, Callable[[Path], object]] = {"decision.json": lambda path: path.write_text(text, encoding="utf-8")}
-    with reporter.stage("pictures"):
-        try:
-            writers |= _pictures(result)
-        finally:  # a picture that fails does not cost the decision
-            write_together(folder, writers)
-    reporter.say(
-        "",
-        f"Pictures: {folder / 'paths.png'} and {folder / 'bounds.png'}; decision: {folder / 'decision.json'}",
-        f"Took {reporter.time_taken()}",
-    )
+def write(folder: Path | None, path_file: Path | None, result: PlanResult, reporter: Reporter) -> None:
+    """Draw and write what is wanted, all of it or nothing; say where it is and how long all took."""
+    writers: dict[str, Callable[[Path], object]] = {}
+    if path_file is not None:
+        text = path_text(path_file, path_poses(result.proposals.paths[result.decision.best]))
+        writers[str(path_file.absolute())] = _writer(text)
+    if folder is not None:
+        writers["decision.json"] = _writer(json.dumps(document(result), indent=2, allow_nan=False) + "\n")
+        with reporter.stage("pictures"):
+            try:
+                writers |= _pictures(result)
+            finally:  # a picture that fails does not cost the decision
+                write_together(folder, writers)
+        reporter.say(
+            "",
+            f"Pictures: {folder / 'paths.png'} and {folder / 'bounds.png'}; decision: {folder / 'decision.json'}",
+        )
+    elif path_file is not None:
+        write_together(path_file.absolute().parent, writers)
+    if path_file is not None:
+        reporter.say(f"Chosen path, with a heading at every pose: {path_file}")
+    if writers:
+        reporter.say(f"Took {reporter.time_taken()}")
+
+
+def _writer(text: str) -> Callable[[Path], object]:
+    return lambda path: path.write_text(text, encoding="utf-8", newline="\n")
 
 
 def _pictures(result: PlanResult) -> dict[str, Callable[[Path], object]]:
@@ -118,14 +165,14 @@ def _pictures(result: PlanResult) -> dict[str, Callable[[Path], object]]:
     from topobelief.report.canvas import save_figure
     from topobelief.report.paths_figure import draw_paths
 
-    candidates, decision = result.candidates, result.decision
+    found, decision = result.proposals, result.decision
     paths = draw_paths(
         result.graph,
         result.world,
-        candidates.paths,
-        candidates.actions,
+        found.paths,
+        found.actions,
         decision,
-        goal=result.goal,
+        goal=[goal.place for goal in result.goals] or [found.paths[decision.best][-1]],
         start=result.start,
     )
     bounds = draw_bounds(decision, result.entropies)
@@ -134,6 +181,13 @@ def _pictures(result: PlanResult) -> dict[str, Callable[[Path], object]]:
 
 def write_together(folder: Path, writers: Mapping[str, Callable[[Path], object]]) -> None:
     """Write files beside their places first; they take their names once all are complete.
+
+    Parameters
+    ----------
+    folder
+        Made where it is missing.
+    writers
+        What writes each, by its name in the folder, or by its whole path for one elsewhere.
 
     Raises
     ------

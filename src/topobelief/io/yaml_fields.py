@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection
 from difflib import get_close_matches
+from pathlib import Path
 from typing import NoReturn, cast
 
 import yaml
@@ -26,11 +27,16 @@ class Field:
         self.name = name
         self._path, self._node = path, node
 
+    @property
+    def line(self) -> int:
+        """Where it begins, counted from 1."""
+        return self._node.start_mark.line + 1
+
     def refuse(self, expected: str, got: str | None = None) -> NoReturn:
         """Raise the error that something else was expected here."""
         found = self._shown() if got is None else got
         place = f"{self.name}: " if self.name else ""
-        raise FileError(self._path, f"{place}expected {expected}, got {found}", line=self._node.start_mark.line + 1)
+        raise FileError(self._path, f"{place}expected {expected}, got {found}", line=self.line)
 
     def entries(self, *, expected: str = "a mapping") -> dict[str, Field]:
         """The fields of a mapping by their keys, whatever these are; at least one."""
@@ -154,9 +160,25 @@ def read_fields(path: StrPath) -> Field:
     FileError
         If the file cannot be read or is not YAML.
     """
+    first, *others = read_documents(path)
+    if others:
+        others[0].refuse("one document", "a second one")
+    return first
+
+
+def read_documents(path: StrPath) -> list[Field]:
+    """The documents of a YAML file, which lines of --- separate, but for those with nothing in them; at least one.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be read or is not YAML.
+    """
     text = read_text(path)
+    if Path(path).suffix.lower() == ".json":
+        text = text.replace("\t", " ")  # by which JSON may be indented, and YAML not
     try:
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
+        nodes = [node for node in yaml.compose_all(text, Loader=yaml.SafeLoader) if not _is_empty(node)]
     except yaml.YAMLError as error:
         if not isinstance(error, yaml.MarkedYAMLError):
             raise FileError(path, "expected YAML, got unreadable characters") from None
@@ -165,6 +187,10 @@ def read_fields(path: StrPath) -> Field:
         raise FileError(path, f"expected YAML, got other text ({reason})", line=line) from None
     except RecursionError:
         raise FileError(path, "expected YAML, got brackets nested too deeply") from None
-    if node is None:
+    if not nodes:
         raise FileError(path, "expected YAML, got comments alone")
-    return Field(path, "", node)
+    return [Field(path, "", node) for node in nodes]
+
+
+def _is_empty(node: yaml.Node) -> bool:
+    return isinstance(node, yaml.ScalarNode) and node.value == "" and node.style is None

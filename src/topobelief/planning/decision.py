@@ -15,6 +15,7 @@ from topobelief.io.json_values import without_nan
 from topobelief.planning.decision_table import as_html, as_text, decision_table
 from topobelief.planning.registry import OBJECTIVES, chosen
 from topobelief.planning.units import quantity, shown_factor, shown_unit
+from topobelief.wording import closures_in_words
 
 SCHEMA = "topobelief.decision/2"
 
@@ -22,6 +23,7 @@ _SIGNATURE_NAMES = {
     "spanning_trees": "spanning trees",
     "von_neumann": "von Neumann entropy",
     "von_neumann_approx": "von Neumann entropy by degrees",
+    "resistance": "effective resistance",
 }
 
 
@@ -33,7 +35,13 @@ class Candidate:
     num_new_poses: int
     num_closures: int
     length: float  # metres, of the path that the robot drives
-    cost: float  # nats
+    cost: float  # in the unit of the objective
+    expected_closures: float = math.nan  # by their probabilities; nan: all are certain
+
+    def closures(self, noun: str = "closure") -> str:
+        """How many closures it has, and how many are expected, in words: "6.9 of 87 possible closures"."""
+        certain = math.isnan(self.expected_closures)
+        return closures_in_words(self.num_closures, float(self.num_closures) if certain else self.expected_closures, noun)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -45,18 +53,19 @@ class Decision(ReadOnlyArrays):
     best : int
         The chosen action: the first of the ranking, or the one of least J once evaluated.
     ranking : shape (K,), int
-        All K actions, best signature first (signature - cost for spanning trees), compared to 32 binary digits; ties by index.
+        All K actions, best signature first (signature - cost where the signature has the objective's unit: spanning trees for
+        entropies, resistance for the expected error), compared to 32 binary digits; ties by index.
     signatures : shape (K,)
         Raw signatures.
     lower, upper : shape (K,)
-        Bounds of the objective plus cost, nats, widened by their rounding errors; after an exact evaluation both are that
+        Bounds of the objective plus cost, in `unit`, widened by their rounding errors; after an exact evaluation both are that
         value widened by its error. nan where not computed.
     entropies : shape (K,)
         Exact objective, cost excluded; nan where not evaluated.
     survivors : shape (number of survivors,), int
         Actions that may still be optimal, in ranking order; the first of the ranking is always among them.
     error_bound : float
-        No action is better than the best by more than this, in the unit; inf where no bounds were asked for.
+        No action is better than the best by more than this, in `unit`; inf where no bounds were asked for.
     margin_met : bool or None
         Whether the upper bound of the best lies below the margin; None where no margin was given.
     num_evaluations : int
@@ -120,10 +129,8 @@ class Decision(ReadOnlyArrays):
         poses = f"{candidate.num_new_poses} new poses, " if candidate.num_new_poses else ""
         first = self.name(self.best)
         of_total = f" of {total}" if total > 1 else ""
-        sentences = [
-            f"{first[:1].upper()}{first[1:]}{of_total} ({candidate.length:.1f} m, {poses}"
-            f"{candidate.num_closures} loop closures) {self._claim()}"
-        ]
+        facts = f"{candidate.length:.1f} m, {poses}{candidate.closures('loop closure')}"
+        sentences = [f"{first[:1].upper()}{first[1:]}{of_total} ({facts}) {self._claim()}"]
         ruled_out = total - len(self.survivors)
         if self.margin_met is not None:
             upper = f"{self.upper[self.best] * shown_factor(self.unit):.1f} {shown_unit(self.unit)}"
@@ -173,6 +180,7 @@ class Decision(ReadOnlyArrays):
             "signature": self.signature,
             "bounds": self.bounds,
             "determinant": self.determinant,
+            "unit": self.unit,
             "error_bound": without_nan(self.error_bound),
             "margin_met": self.margin_met,
             "num_evaluations": self.num_evaluations,
@@ -186,6 +194,7 @@ class Decision(ReadOnlyArrays):
                     "num_new_poses": candidate.num_new_poses,
                     "num_closures": candidate.num_closures,
                     "length": candidate.length,
+                    "expected_closures": without_nan(candidate.expected_closures),
                     "cost": candidate.cost,
                     "signature": without_nan(self.signatures[index]),
                     "lower": without_nan(self.lower[index]),
@@ -220,7 +229,15 @@ class Decision(ReadOnlyArrays):
                 )
             }
             candidates = tuple(
-                Candidate(a["label"], a["num_new_poses"], a["num_closures"], a["length"], a["cost"]) for a in actions
+                Candidate(
+                    a["label"],
+                    a["num_new_poses"],
+                    a["num_closures"],
+                    a["length"],
+                    a["cost"],
+                    _from_json(a.get("expected_closures"), unknown=math.nan),
+                )
+                for a in actions
             )
             return cls(
                 best=data["best"],

@@ -5,11 +5,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Literal
 
+from topobelief.planning.registry import SIGNATURE_UNITS
 from topobelief.planning.units import cell, shown_unit
+from topobelief.wording import counted
 
 if TYPE_CHECKING:
     from topobelief.planning.decision import Decision
@@ -17,6 +20,7 @@ if TYPE_CHECKING:
 Standing = Literal["yes", "maybe", "no"]
 """Whether an action is the best: chosen, may be better than the chosen one, or cannot be the best."""
 
+_HTML_ROWS = 30
 _MUTED = {"no": ' style="opacity: 0.55"', "yes": ' style="font-weight: bold"', "maybe": ""}
 
 
@@ -49,7 +53,7 @@ def decision_table(decision: Decision) -> DecisionTable:
     """The actions in ranking order; exact values and costs only where there are any."""
     unit = decision.unit
     values = {
-        "signature": [cell(value) for value in decision.signatures],
+        "signature": [cell(value, SIGNATURE_UNITS.get(decision.signature, "")) for value in decision.signatures],
         "lower": [cell(value, unit) for value in decision.lower],
         "upper": [cell(value, unit) for value in decision.upper],
     }
@@ -58,7 +62,10 @@ def decision_table(decision: Decision) -> DecisionTable:
     if any(candidate.cost for candidate in decision.candidates):
         values["cost"] = [cell(candidate.cost, unit) for candidate in decision.candidates]
     values["poses"] = [str(candidate.num_new_poses) for candidate in decision.candidates]
-    values["closures"] = [str(candidate.num_closures) for candidate in decision.candidates]
+    values["closures"] = [
+        str(candidate.num_closures) if math.isnan(candidate.expected_closures) else f"{candidate.expected_closures:.1f}"
+        for candidate in decision.candidates
+    ]
     values["metres"] = [f"{candidate.length:.1f}" for candidate in decision.candidates]
     columns = (Column("#"), Column("action", is_text=True), *map(Column, values), Column("best", is_text=True))
     surviving = set(decision.survivors.tolist())
@@ -91,7 +98,10 @@ def as_text(table: DecisionTable) -> str:
 
 
 def as_html(table: DecisionTable, sentence: str) -> str:
-    """A sentence and the table beneath, for a notebook; takes colours and fonts from the page."""
+    """A sentence and the table beneath, for a notebook; takes colours and fonts from the page.
+
+    Of a long table the first rows and that of the best action are shown.
+    """
 
     def line(tag: str, cells: tuple[str, ...], look: str = "") -> str:
         aligned = (
@@ -101,8 +111,11 @@ def as_html(table: DecisionTable, sentence: str) -> str:
         return f"<tr{look}>{''.join(aligned)}</tr>"
 
     head = line("th", tuple(column.name for column in table.columns))
-    body = "\n".join(line("td", row.cells, _MUTED[row.standing]) for row in table.rows)
-    notes = "<br>".join(map(escape, table.notes))
+    shown = [*table.rows[:_HTML_ROWS], *(row for row in table.rows[_HTML_ROWS:] if row.standing == "yes")]
+    body = "\n".join(line("td", row.cells, _MUTED[row.standing]) for row in shown)
+    left_out = len(table.rows) - len(shown)
+    more = [f"{counted(left_out, 'more action')} in print(decision)."] if left_out else []
+    notes = "<br>".join(map(escape, [*more, *table.notes]))
     return (
         f"<p>{escape(sentence)}</p>\n<table>\n<thead>{head}</thead>\n<tbody>\n{body}\n</tbody>\n</table>\n"
         f"<p><small>{notes}</small></p>"

@@ -81,8 +81,7 @@ class Search:
                 self._bound(places, batch)
             done += len(places)
             self._clock.report("signatures", done, len(different))
-        in_nats = self._criteria.signature == "spanning_trees"
-        costs = self._costs if in_nats else np.zeros_like(self._costs)
+        costs = self._costs if self._criteria.signature_estimates_objective else np.zeros_like(self._costs)
         self._signatures = self._signatures[self._first]
         self._ranking = ranking_of(self._signatures, costs).tolist()
 
@@ -200,9 +199,11 @@ class Search:
         return free if np.isfinite(free.value).all() else self._batch(places).entropies()
 
     def _best(self) -> int:
-        """U^, or the least value once evaluated; the earlier in the ranking where values tie."""
-        values = (self._entropies + self._costs)[self._ranking]
-        return self._ranking[0 if np.isnan(values).all() else int(np.nanargmin(values))]
+        """U^, or the least value once evaluated; the earlier in the ranking where values tie, rounded as signatures are."""
+        values = np.where(np.isnan(self._entropies), np.inf, self._entropies)[self._ranking]
+        if np.isinf(values).all():
+            return self._ranking[0]
+        return self._ranking[int(ranking_of(-values, self._costs[self._ranking])[0])]
 
     def _survivors(self) -> list[int]:
         """Actions that no bound rules out, in ranking order; U^ stays."""
@@ -234,7 +235,14 @@ class Search:
             num_evaluations=int(np.count_nonzero(~np.isnan(self._values))),
             proven_optimal=proven,
             candidates=tuple(
-                Candidate(action.label, action.num_new_poses, action.num_closures, length, action.cost)
+                Candidate(
+                    action.label,
+                    action.num_new_poses,
+                    action.num_closures,
+                    length,
+                    action.cost,
+                    math.nan if action.probabilities is None else action.expected_closures,
+                )
                 for action, length in zip(self._actions, driven_lengths(self._engine.graph, self._actions), strict=True)
             ),
             objective=criteria.objective,

@@ -82,7 +82,7 @@ def draw_paths(
         On these actions.
     world
         Where the robot may be; drawn beneath where given.
-    goal : shape (2,), optional
+    goal : shape (2,) or (G, 2), optional
         Metres. Default: where the chosen path ends.
     start
         As given to `predict_actions`. Default: the last pose.

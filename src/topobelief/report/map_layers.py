@@ -13,18 +13,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from topobelief.arrays import FloatArray, IntArray
+from topobelief.candidates.seen_again import Stretch, closing_edges, seen_again
 from topobelief.candidates.start import Start, find_start
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.decision import Decision
 from topobelief.report import style
 from topobelief.report.canvas import Entry, Panel
-from topobelief.symbols import node_name
 from topobelief.world import World
 
 _MIN_VIEW = 6.0  # metres
 _CLOSURES_DRAWN = 2  # of each new pose: with all that a rule by hand predicts, nothing else would be seen
-_STRETCH_GAP = 3  # poses; what is seen again counts as one stretch across fewer unseen ones
 _PART = 0.6  # of the whole map's width and height: candidates that fill less are shown alone
 _BAND = 6.5  # points
 _MANY_PATHS = 8  # from here on their lines are thinner
@@ -79,23 +78,23 @@ class Sight:
         Where their ends lie, as the action states them, metres.
     seen : shape (number of poses,), int
         Existing poses among their ends, increasing.
+    stretches
+        Of these, those with most closures first.
     """
 
     closures: IntArray
     segments: FloatArray
     seen: IntArray
+    stretches: list[Stretch]
 
     @classmethod
     def of(cls, graph: PoseGraph, start: Start, action: Action) -> Sight:
         """Of an action that begins at a start."""
         positions = np.concatenate([graph.positions, graph.group.position(action.poses)])[:, :2]
-        pairs = np.sort(action.edges, axis=1)
-        low, high = pairs.T
-        first = (low == start.pose) & (high == graph.num_poses)
-        between_new = (low >= graph.num_poses) & (high - low == 1)
-        closing = ~(first | between_new)
-        closures = pairs[closing]
-        return cls(closures, positions[action.edges[closing]], np.unique(closures[closures < graph.num_poses]))
+        closing = closing_edges(graph, start.pose, action)
+        closures = np.sort(action.edges[closing], axis=1)
+        seen = np.unique(closures[closures < graph.num_poses])
+        return cls(closures, positions[action.edges[closing]], seen, seen_again(graph, start.pose, action))
 
     def thinned(self) -> FloatArray:
         """Segments of the shortest closures of each new pose, in the order of the action."""
@@ -104,14 +103,6 @@ class Sight:
         order = np.lexsort((length, new))
         begins = np.searchsorted(new[order], new[order])  # where the closures of the same new pose begin
         return self.segments[np.sort(order[np.arange(len(order)) - begins < _CLOSURES_DRAWN])]
-
-    def stretches(self, graph: PoseGraph) -> list[tuple[str, str]]:
-        """First and last pose, by what the file calls them, of each stretch of poses seen, those with most poses first."""
-        if not len(self.seen):
-            return []
-        parts = np.split(self.seen, np.flatnonzero(np.diff(self.seen) > _STRETCH_GAP) + 1)
-        ends: list[list[int]] = [graph.ids[part[[0, -1]]].tolist() for part in sorted(parts, key=len, reverse=True)]
-        return [(node_name(first), node_name(last)) for first, last in ends]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,8 +113,10 @@ class Scene:
     ----------
     graph, world, paths, decision
         As `topobelief.draw_paths` takes them.
-    start, goal
-        Where the paths begin and end.
+    start
+        Where the paths begin.
+    goals : shape (G, 2)
+        Where they lead.
     sight
         Of the chosen action.
     view, whole
@@ -135,7 +128,7 @@ class Scene:
     paths: Sequence[FloatArray]
     decision: Decision
     start: Start
-    goal: FloatArray
+    goals: FloatArray
     sight: Sight
     view: View
     whole: View
@@ -152,15 +145,15 @@ class Scene:
         goal: ArrayLike | None = None,
         start: int | ArrayLike | Start | None = None,
     ) -> Scene:
-        """Of what was decided; the goal is where the chosen path ends unless it is given."""
+        """Of what was decided; the goal, or each row of goals, is where the chosen path ends unless it is given."""
         begin = find_start(graph, start, world=world)
-        end = np.asarray(paths[decision.best][-1] if goal is None else goal, dtype=np.float64)[:2]
+        ends = np.atleast_2d(np.asarray(paths[decision.best][-1] if goal is None else goal, dtype=np.float64))[:, :2]
         sight = Sight.of(graph, begin, actions[decision.best])
-        seen = np.concatenate([begin.place[None], end[None], *paths, sight.segments.reshape(-1, 2)])
+        seen = np.concatenate([begin.place[None], ends, *paths, sight.segments.reshape(-1, 2)])
         view = View.around(seen, padding=0.07)
         whole = View.around(np.concatenate([_extent(graph, world), seen]), padding=0.02)
         part = max(near / far for near, far in zip(view.size, whole.size, strict=True))
-        return cls(graph, world, paths, decision, begin, end, sight, view if part < _PART else whole, whole)
+        return cls(graph, world, paths, decision, begin, ends, sight, view if part < _PART else whole, whole)
 
     @property
     def zoomed(self) -> bool:
@@ -173,7 +166,7 @@ class Scene:
         key += draw_graph(panel, self.graph, view)
         key += draw_candidates(panel, self.paths, self.decision)
         key += draw_sight(panel, self.graph, self.sight)
-        key += draw_ends(panel, self.graph, self.start, self.goal)
+        key += draw_ends(panel, self.graph, self.start, self.goals)
         view.shown_on(panel)
         panel.map_axes()
         return key
@@ -254,14 +247,14 @@ def draw_candidates(panel: Panel, paths: Sequence[FloatArray], decision: Decisio
     return key
 
 
-def draw_ends(panel: Panel, graph: PoseGraph, start: Start, goal: FloatArray) -> list[Entry]:
-    """Start and goal."""
+def draw_ends(panel: Panel, graph: PoseGraph, start: Start, goals: FloatArray) -> list[Entry]:
+    """Start and goals, shape (G, 2)."""
     at_pose = "the graph's last pose" if start.pose == graph.num_poses - 1 else f"pose {graph.ids[start.pose]}"
     name = f"start, {f'near {at_pose}' if start.distance(graph) else at_pose}"
     key: list[Entry] = []
     for label, place, marker, colour, size in (
         (name, start.place, "o", "white", 6.0),
-        ("goal", goal, "*", style.GOAL, 12.0),
+        ("goal" if len(goals) == 1 else f"goals ({len(goals)})", goals, "*", style.GOAL, 12.0),
     ):
         look: dict[str, Any] = {"marker": marker, "markerfacecolor": colour, "markeredgecolor": style.INK, "markersize": size}
         panel.line(place, linestyle="none", zorder=9, **look)

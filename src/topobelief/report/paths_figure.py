@@ -1,8 +1,8 @@
 """The candidate paths over the map: what the robot could drive, what it chose, and what it would see again.
 
-Beneath lie the world (free space white, all else grey) and the pose graph as it stands; the chosen path carries the loop
-closures that it is predicted to make. Where the candidates fill a small part of the world, the large panel shows that
-part and a small one the whole.
+Beneath lie the world (free space white, all else grey) and the pose graph as it stands. A band marks the poses that the chosen
+path sees again, and thin lines the shortest of the loop closures that it is predicted to make. Where the candidates fill a
+small part of the world, the large panel shows that part and a small one the whole.
 """
 
 from __future__ import annotations
@@ -56,8 +56,8 @@ def draw_paths(
         K, what each path adds to the graph.
     decision
         On these actions.
-    goal : shape (2,)
-        Metres.
+    goal : shape (2,) or (G, 2)
+        Metres; several goals are drawn alike.
     start
         As given to `predict_actions`. Default: the last pose.
 
@@ -113,10 +113,10 @@ def _title(decision: Decision) -> str:
 
 def _subtitle(scene: Scene, *, width: float) -> str:
     """The chosen path in numbers, with as many of the stretches that it sees again as there is room for."""
-    best, stretches = scene.decision.candidates[scene.decision.best], scene.sight.stretches(scene.graph)
-    numbers = f"{best.length:.1f} m, {counted(best.num_new_poses, 'new pose')}, {counted(len(scene.sight.closures), 'closure')}"
+    best, stretches = scene.decision.candidates[scene.decision.best], scene.sight.stretches
+    numbers = f"{best.length:.1f} m, {counted(best.num_new_poses, 'new pose')}, {best.closures()}"
     for named in range(min(_STRETCHES_NAMED, len(stretches)), 0, -1):
-        names = [first if first == last else f"{first} to {last}" for first, last in stretches[:named]]
+        names = [stretch.name(scene.graph) for stretch in stretches[:named]]
         others = len(stretches) - named
         more = f" and {counted(others, 'more stretch', 'more stretches')}" if others else ""
         subtitle = f"{numbers}; sees poses {', '.join(names)}{more} again"

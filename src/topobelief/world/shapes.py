@@ -187,6 +187,11 @@ def nearest_part(shape: Shape, place: FloatArray) -> Polygon | None:
     return min(polygons(shape), key=lambda part: float(part.distance(point(place))), default=None)
 
 
+def nearest_place(shape: Shape, place: FloatArray) -> FloatArray:
+    """The place of a shape that is nearest to a place, shape (2,)."""
+    return _shapely.get_coordinates(_shapely.shortest_line(shape, point(place)))[0]
+
+
 class SegmentIndex:
     """Straight segments, indexed by where they are.
 

@@ -1,0 +1,93 @@
+"""Where a plan begins and where it leads: poses by their ids, or places."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from topobelief.arrays import FloatArray
+from topobelief.candidates.start import Start, find_start
+from topobelief.cli.console import Reporter
+from topobelief.cli.plan_arguments import GivenPlace
+from topobelief.errors import InvalidInputError
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.symbols import find_node, node_name
+from topobelief.world import World
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Goal:
+    """A place to go to, and what to call it."""
+
+    place: FloatArray  # shape (2,), metres, world frame
+    name: str
+
+
+def choose_start(graph: PoseGraph, world: World, reporter: Reporter, given: GivenPlace | None = None) -> Start:
+    """The pose with an id, a place, or the last pose; told, and whether the robot may be elsewhere.
+
+    Raises
+    ------
+    InvalidInputError
+        Where the graph has no pose of that id.
+    PlanningError
+        Where no pose is in sight of the place.
+    """
+    ids: list[int] = graph.ids.tolist()
+    if given is not None and given.place is not None:
+        start = find_start(graph, given.place, world=world)
+        nearest = f"{start.distance(graph):.2f} m from pose {node_name(ids[start.pose])}, the nearest in sight"
+        reporter.say(f"from {shown(start.place)}, {nearest}")
+        return start
+    if given is not None:
+        start = find_start(graph, _index(graph, given, "--start"))
+        reporter.say(f"from pose {given} at {shown(start.place)}")
+        return start
+    last = graph.num_poses - 1
+    start = find_start(graph, last)
+    reporter.say(f"from pose {node_name(ids[last])}, the last of the file, at {shown(start.place)}")
+    end = graph.odometry_end
+    if end is not None and end != last:
+        reporter.note(
+            f"the odometry from the first pose on ends at pose {node_name(ids[end])}, not at pose {node_name(ids[last])}; "
+            f"if the robot stands there, pass --start {node_name(ids[end])}"
+        )
+    return start
+
+
+def choose_goals(graph: PoseGraph, given: Sequence[GivenPlace]) -> list[Goal]:
+    """The places of poses with these ids, or the places themselves.
+
+    Raises
+    ------
+    InvalidInputError
+        Where the graph has no pose of an id, or two goals are one place.
+    """
+    goals: list[Goal] = []
+    for each in given:
+        if each.place is None:
+            goals.append(Goal(graph.positions[_index(graph, each, "--goal"), :2], f"pose {each}"))
+        else:
+            goals.append(Goal(np.array(each.place), shown(each.place)))
+        for earlier in goals[:-1]:
+            if (earlier.place == goals[-1].place).all():
+                raise InvalidInputError(
+                    f"expected different goals, got {earlier.name} and {goals[-1].name}, which are one place"
+                )
+    return goals
+
+
+def _index(graph: PoseGraph, given: GivenPlace, option: str) -> int:
+    ids: list[int] = graph.ids.tolist()
+    index = find_node(ids, str(given.pose_id))
+    if index is None:
+        known = f"from {node_name(min(ids))} to {node_name(max(ids))}"
+        raise InvalidInputError(f"expected {option} as the id of a pose of the file ({known}) or as X Y, got {given.pose_id}")
+    return index
+
+
+def shown(place: Sequence[float] | FloatArray) -> str:
+    """A place for a person."""
+    return f"({place[0]:.2f}, {place[1]:.2f})"

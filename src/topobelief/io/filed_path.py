@@ -1,0 +1,71 @@
+"""A path as a file gives it: poses, and the line on which each stands."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from topobelief.arrays import FloatArray, ReadOnlyArrays, frozen_floats
+from topobelief.errors import FileError
+from topobelief.geometry.planar import headings_of_quaternions
+from topobelief.io.files import StrPath
+
+_UNIT_TOLERANCE = 0.01  # on the length of a quaternion, which files may give in few digits
+
+
+@dataclass(frozen=True, eq=False)
+class FiledPath(ReadOnlyArrays):
+    """Poses of shape (N, 3): x and y in metres and yaw in radians, world frame; and their lines, counted from 1."""
+
+    poses: FloatArray
+    lines: tuple[int, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "poses", frozen_floats(self.poses, name="poses"))
+
+
+def path_of_quaternions(path: StrPath, rows: Sequence[Sequence[float]], lines: Sequence[int]) -> FiledPath:
+    """A path from rows x, y, qx, qy, qz, qw.
+
+    Raises
+    ------
+    FileError
+        Names the line of a quaternion whose length is not 1.
+    """
+    numbers = np.array(rows, dtype=np.float64)
+    lengths = np.linalg.norm(numbers[:, 2:], axis=1)
+    bad = np.flatnonzero(~(np.abs(lengths - 1) <= _UNIT_TOLERANCE))
+    if bad.size:
+        first, length = int(bad[0]), float(lengths[bad[0]])
+        advice = "; give 0 0 0 1 where the heading does not matter" if length == 0 else ""
+        raise FileError(path, f"expected a quaternion of length 1, got one of {length:.4g}{advice}", line=lines[first])
+    headings = headings_of_quaternions(numbers[:, 2:] / lengths[:, None])
+    return FiledPath(np.column_stack([numbers[:, :2], headings]), tuple(lines))
+
+
+def numbered_lines(text: str) -> Iterator[tuple[int, str]]:
+    """The lines that are neither empty nor comments, with their numbers."""
+    for number, line in enumerate(text.splitlines(), start=1):
+        stripped = line.strip()
+        if stripped and not stripped.startswith("#"):
+            yield number, stripped
+
+
+def finite_numbers(path: StrPath, line: int, fields: Sequence[str], names: str) -> list[float]:
+    """As many finite numbers as there are names, which are separated by blanks.
+
+    Raises
+    ------
+    FileError
+        Names the line.
+    """
+    try:
+        numbers = [float(field) for field in fields]
+    except ValueError:
+        numbers = []
+    if len(numbers) != len(names.split()) or not all(map(math.isfinite, numbers)):
+        raise FileError(path, f"expected finite numbers {names}, got {' '.join(fields)[:60]!r}", line=line)
+    return numbers

@@ -1,0 +1,80 @@
+"""Paths as messages of ROS, nav_msgs/Path, in YAML as `ros2 topic echo` prints it, or in JSON, which is YAML too."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import yaml
+
+from topobelief.arrays import FloatArray
+from topobelief.geometry.planar import quaternions_of_headings
+from topobelief.io.filed_path import FiledPath, path_of_quaternions
+from topobelief.io.files import StrPath
+from topobelief.io.yaml_fields import Field, read_documents
+
+_EXPECTED = "a nav_msgs/Path with its list of poses"
+
+
+def read_nav_path(path: StrPath) -> FiledPath:
+    """Read one nav_msgs/Path; stamps, the frame, heights and tilts do not matter.
+
+    Raises
+    ------
+    FileError
+        Names the line and the field that is not what it should be; of a message that was printed in short, how to print
+        it whole.
+    """
+    documents = read_documents(path)
+    if len(documents) > 1:
+        documents[1].refuse("one message", f"{len(documents)}; keep one, as `ros2 topic echo --once` prints it")
+    rows: list[list[float]] = []
+    lines: list[int] = []
+    for item in _child(documents[0], "poses", _EXPECTED).items(expected="a list of at least one pose"):
+        if not item.is_mapping() and not item.is_list() and item.text() == "...":
+            item.refuse("all poses", "a list that is cut short; print it with `ros2 topic echo --full-length`")
+        pose = _child(item, "pose", "a pose with its header")
+        position, orientation = (_child(pose, name, f"the field {name}") for name in ("position", "orientation"))
+        x_y = [_child(position, name, f"the field {name}").number() for name in "xy"]
+        rows.append(x_y + [_child(orientation, name, f"the field {name}").number() for name in "xyzw"])
+        lines.append(item.line)
+    return path_of_quaternions(path, rows, lines)
+
+
+def _child(field: Field, name: str, expected: str) -> Field:
+    """A field of a message, whatever other fields it has."""
+    found = field.entries(expected=expected)
+    if name not in found:
+        field.refuse(expected, f"no field {name!r} in it")
+    return found[name]
+
+
+def yaml_of_path(poses: FloatArray) -> str:
+    """The text of a YAML file of poses of shape (N, 3), in the frame "map", as `ros2 topic echo` prints it."""
+    return yaml.safe_dump(_message(poses), sort_keys=False)
+
+
+def json_of_path(poses: FloatArray) -> str:
+    """As `yaml_of_path`, in JSON."""
+    return json.dumps(_message(poses), indent=2) + "\n"
+
+
+def _message(poses: FloatArray) -> dict[str, Any]:
+    def header() -> dict[str, Any]:
+        return {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": "map"}
+
+    places: list[list[float]] = poses[:, :2].tolist()
+    quaternions: list[list[float]] = quaternions_of_headings(poses[:, 2]).tolist()
+    return {
+        "header": header(),
+        "poses": [
+            {
+                "header": header(),
+                "pose": {
+                    "position": dict(zip("xyz", (*place, 0.0), strict=True)),
+                    "orientation": dict(zip("xyzw", quaternion, strict=True)),
+                },
+            }
+            for place, quaternion in zip(places, quaternions, strict=True)
+        ],
+    }

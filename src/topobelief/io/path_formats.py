@@ -1,0 +1,110 @@
+"""Paths in whatever format the suffix of their file names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from topobelief.arrays import FloatArray, frozen_floats
+from topobelief.errors import FileError, InvalidInputError
+from topobelief.io.filed_path import FiledPath
+from topobelief.io.files import StrPath, write_text
+from topobelief.io.nav_path import json_of_path, read_nav_path, yaml_of_path
+from topobelief.io.paths_csv import csv_of_path, read_csv_path
+from topobelief.io.tum import read_tum_path, tum_of_path
+
+_READERS: dict[str, Callable[[StrPath], FiledPath]] = {
+    ".csv": read_csv_path,
+    ".tum": read_tum_path,
+    ".txt": read_tum_path,
+    ".yaml": read_nav_path,
+    ".yml": read_nav_path,
+    ".json": read_nav_path,
+}
+_WRITERS: dict[str, Callable[[FloatArray], str]] = {
+    ".csv": csv_of_path,
+    ".tum": tum_of_path,
+    ".txt": tum_of_path,
+    ".yaml": yaml_of_path,
+    ".yml": yaml_of_path,
+    ".json": json_of_path,
+}
+
+_Found = TypeVar("_Found")
+
+
+def read_path(path: StrPath) -> FloatArray:
+    """Read a path by the suffix of its file.
+
+    Parameters
+    ----------
+    path
+        .csv (x,y or x,y,yaw), .tum or .txt (TUM: timestamp x y z qx qy qz qw), .yaml, .yml or .json (nav_msgs/Path, as
+        `ros2 topic echo` prints it).
+
+    Returns
+    -------
+    shape (N, 3)
+        x and y in metres, yaw in radians; where a CSV has no yaw, the direction in which a pose is reached. Heights, tilts
+        and times are left out.
+
+    Raises
+    ------
+    FileError
+        For another suffix, and where the file is not what it should be; names the line.
+    """
+    return read_filed_path(path).poses
+
+
+def read_filed_path(path: StrPath) -> FiledPath:
+    """As `read_path`, with the line of each pose."""
+    return _by_suffix(path, _READERS)(path)
+
+
+def write_path(path: StrPath, poses: ArrayLike) -> None:
+    """Write a path in the format that the suffix of its file names; see `read_path`.
+
+    Parameters
+    ----------
+    path
+    poses : shape (N, 3)
+        x and y in metres, yaw in radians; `path_poses` gives them. In TUM the times count poses; a nav_msgs/Path has stamps of
+        0 and the frame "map".
+
+    Raises
+    ------
+    InvalidInputError
+        Where the poses are not finite or not of that shape.
+    FileError
+        For another suffix, or where the file cannot be written.
+    """
+    write_text(path, path_text(path, poses))
+
+
+def path_text(path: StrPath, poses: ArrayLike) -> str:
+    """What `write_path` writes."""
+    writer = _by_suffix(path, _WRITERS)
+    array = frozen_floats(poses, name="poses")
+    if array.ndim != 2 or array.shape[1] != 3 or len(array) == 0 or not np.isfinite(array).all():
+        raise InvalidInputError(f"expected finite poses x, y, yaw of shape (N, 3), got {array.shape}; `path_poses` adds yaw")
+    return writer(array)
+
+
+def require_path_suffix(path: StrPath) -> None:
+    """Raise `FileError` where no format has this suffix."""
+    _by_suffix(path, _WRITERS)
+
+
+def _by_suffix(path: StrPath, formats: Mapping[str, _Found]) -> _Found:
+    suffix = Path(path).suffix.lower()
+    if suffix not in formats:
+        raise FileError(
+            path,
+            "expected a path that ends in .csv, .tum, .txt (TUM), .yaml, .yml or .json (nav_msgs/Path), "
+            f"got {suffix or 'no suffix'}",
+        )
+    return formats[suffix]
