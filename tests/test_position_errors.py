@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from topobelief.io.gtsam import to_gtsam
+from topobelief.conversions.gtsam import to_gtsam
 
 from data_files import RECORDED, data_file
 from graphs import SE2_GROUP, SE3_GROUP, Noise, pose_graphs, random_pose_graph, relabelled, sessions
