@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from topobelief.conversions.gtsam import to_gtsam
 
 from data_files import RECORDED, data_file
 from graphs import SE2_GROUP, SE3_GROUP, Noise, pose_graphs, random_pose_graph, relabelled, sessions
 from references import covariance_reference, error_reference
 from topobelief import position_errors as module
+from topobelief.conversions.gtsam import to_gtsam
 from topobelief.errors import DisconnectedGraphError, IllConditionedError, InvalidInputError
 from topobelief.graph.action import posterior
 from topobelief.graph.information import block_isotropic
