@@ -159,7 +159,7 @@ def test_a_comparison_is_continued(topobelief, room, tmp_path):
     assert (tmp_path / "compared" / "comparison.csv").read_text() == first
     other = topobelief([*arguments[:-1], "shortest,random"])
     assert other.code == 2
-    assert "expected the same comparison" in other.err
+    assert "expected a run with the same settings, strategies" in other.err
 
 
 def test_physical_noise_cannot_be_redrawn(topobelief, room):

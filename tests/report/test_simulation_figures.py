@@ -76,8 +76,8 @@ def test_the_best_and_the_worst_topology():
     figure = draw_topologies(each, record.scenario.world, name="room, leg 2")
     words = texts(figure)
     best = int(each.entropies.argmin())
-    assert f"Candidate {best + 1} of 2, least entropy, chosen" in words
-    assert f"Candidate {2 - best} of 2, greatest entropy" in words
+    assert f"Path {best} of 2, least entropy, chosen" in words
+    assert f"Path {1 - best} of 2, greatest entropy" in words
     assert f"{each.entropies.max():.1f} nats" in words
     assert "room, leg 2" in words
 

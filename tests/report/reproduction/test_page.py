@@ -148,9 +148,7 @@ def test_hovering_a_path_on_the_map_selects_it(opened: Any) -> None:
     opened.select_option("#session", "S1")
     x, y, index = opened.evaluate(LONELIEST_POINT)
     opened.mouse.move(x, y)
-    opened.wait_for_function(
-        "text => document.getElementById('selected').textContent.startsWith(text)", arg=f"Path {index + 1} "
-    )
+    opened.wait_for_function("text => document.getElementById('selected').textContent.startsWith(text)", arg=f"Path {index} ")
 
 
 @browser_test

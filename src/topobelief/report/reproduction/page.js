@@ -30,7 +30,7 @@
   };
   const describe = (session, index) => {
     const a = session.actions[index], f = at("family").value;
-    return `Path ${a.action}, one of ${session.actions.length}: ${number(a.length, 1)} m, ${a.num_new_poses} new poses, ` +
+    return `Path ${a.action} of ${session.actions.length}: ${number(a.length, 1)} m, ${a.num_new_poses} new poses, ` +
       `${a.num_closures} closures. Joint entropy ${number(a.joint)} nats, between ${number(a[f + "_lower"])} and ` +
       `${number(a[f + "_upper"])} by bounds; map entropy ${number(a.map)}. s_ST ${number(a.spanning_trees)}, ` +
       `s_VN ${number(a.von_neumann, 3)}, ŝ_VN ${number(a.von_neumann_approx, 3)}.`;
