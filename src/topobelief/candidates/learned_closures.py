@@ -102,6 +102,8 @@ class History:
         Least difference of the indices of their poses.
     closures : shape (C, 2)
         Later pose, earlier pose; each pair once, sorted.
+    edges : shape (C,)
+        The first edge of the graph that measures each.
     radius, angle
         Which 90 % of them do not exceed as measured, metres and radians; nan where there are none.
     step
@@ -110,6 +112,7 @@ class History:
 
     gap: int
     closures: IntArray
+    edges: IntArray
     radius: float
     angle: float
     step: float
@@ -125,30 +128,28 @@ class History:
         late, early = graph.edges.max(axis=1, initial=0), graph.edges.min(axis=1, initial=graph.num_poses)
         apart = late - early
         distances = np.linalg.norm(graph.group.position(graph.measurements), axis=1)
-        angles = np.linalg.norm(graph.group.rotation_vector(graph.measurements), axis=1)
         step = float(np.median(distances[apart == 1])) if (apart == 1).any() else 0.0
-        if gap is not None:
-            return cls._by_gap(gap, step, late, early, distances, angles)
-        skipping = apart[apart > 1]
-        seen = int(np.quantile(skipping, _RECENT, method="lower")) if skipping.size else _USUAL_GAP
-        gap = max(_LEAST_GAP, min(seen, _USUAL_GAP))
-        if step > 0 and (apart >= gap).any():
-            radius = float(np.quantile(distances[apart >= gap], _REACH))
-            gap = max(gap, min(seen, math.ceil(radius / step) + 1))
-        return cls._by_gap(gap, step, late, early, distances, angles)
-
-    @classmethod
-    def _by_gap(
-        cls, gap: int, step: float, late: IntArray, early: IntArray, distances: FloatArray, angles: FloatArray
-    ) -> History:
-        apart = late - early
+        if gap is None:
+            gap = _usual_gap(apart, distances, step)
         closing = np.flatnonzero(apart >= gap)
-        if closing.size == 0:
-            return cls(gap, np.zeros((0, 2), dtype=np.int64), math.nan, math.nan, step)
         pairs, first = np.unique(np.stack([late[closing], early[closing]], axis=1), axis=0, return_index=True)
         edges = closing[first]
-        radius, angle = (float(np.quantile(values[edges], _REACH)) for values in (distances, angles))
-        return cls(gap, pairs, radius, angle, step)
+        if edges.size == 0:
+            return cls(gap, pairs.reshape(0, 2), edges, math.nan, math.nan, step)
+        angles = np.linalg.norm(graph.group.rotation_vector(graph.measurements[edges]), axis=1)
+        radius, angle = (float(np.quantile(values, _REACH)) for values in (distances[edges], angles))
+        return cls(gap, pairs, edges, radius, angle, step)
+
+
+def _usual_gap(apart: IntArray, distances: FloatArray, step: float) -> int:
+    """g of `learn_closures`, from all edges and the median step of odometry."""
+    skipping = apart[apart > 1]
+    seen = int(np.quantile(skipping, _RECENT, method="lower")) if skipping.size else _USUAL_GAP
+    gap = max(_LEAST_GAP, min(seen, _USUAL_GAP))
+    if step > 0 and (apart >= gap).any():
+        radius = float(np.quantile(distances[apart >= gap], _REACH))
+        gap = max(gap, min(seen, math.ceil(radius / step) + 1))
+    return gap
 
 
 def num_opportunities(graph: PoseGraph, model: ClosureModel, *, world: World | None = None) -> int:
