@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from time import monotonic
@@ -81,12 +80,12 @@ def exact_entropies(
     The decision stands without them, so a value that could not be computed is reported and left out.
     """
     values = decision.entropies.copy()
-    missing = decision.ranking[np.isnan(values[decision.ranking])]
-    if not wanted or missing.size == 0:
+    missing: list[int] = decision.ranking[np.isnan(values[decision.ranking])].tolist()
+    if not wanted or not missing:
         return values
     begin, failures = monotonic(), list[TopobeliefError]()
     with reporter.stage("exact values") as update:
-        parts = np.array_split(missing, math.ceil(len(missing) / _AT_ONCE))
+        parts = [missing[first : first + _AT_ONCE] for first in range(0, len(missing), _AT_ONCE)]
         for done, part in enumerate(parts):
             if monotonic() - begin > EXACT_SECONDS:
                 break
