@@ -23,7 +23,7 @@ $(STAMP): pyproject.toml constraints.txt
 
 demo: install
 	$(BIN)/topobelief plan examples/office/recorded.g2o --map examples/office/recorded.yaml --goal 25 -2.95 \
-	  --max-detour 2.5 --objective map --proof optimal --out out/demo
+	  --max-detour 2.5 --out out/demo
 
 test: install
 	$(BIN)/python -m pytest -n auto

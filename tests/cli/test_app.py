@@ -57,7 +57,7 @@ def test_a_shell_completes_options(office):
     code = "import sys; from topobelief.cli import main; main()"
     asked = {"_TOPOBELIEF_COMPLETE": "complete_bash", "COMP_WORDS": "topobelief plan --clos", "COMP_CWORD": "2"}
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env={**os.environ, **asked})
-    assert result.stdout.split() == ["--closure-radius", "--closure-angle"]
+    assert result.stdout.split() == ["--closures", "--closure-radius", "--closure-angle"]
     assert result.stderr == ""
 
 

@@ -84,7 +84,7 @@ def test_options_of_reading_that_make_no_sense(topobelief, files, options, messa
         (("50", "5"), "expected a goal on the map"),
         (("5", "5"), "got (5, 5), in an obstacle"),
         (("10", "-0.7"), "got (10, -0.7), 0.10 m from the nearest obstacle"),
-        (("nan", "5"), "expected two finite numbers"),
+        (("nan", "5"), "'--goal': expected the id of a pose or X Y in metres, got 'nan 5'"),
     ],
 )
 def test_goals_that_cannot_be(topobelief, office, goal, message):
@@ -111,7 +111,7 @@ def test_a_goal_behind_walls(topobelief, office, tmp_path):
         (["--max-detour", "far"], "'--max-detour': expected a factor of at least 1"),
         (["--closure-angle", "4"], "'--closure-angle': expected at most 3.14159, got 4; angles are in radians, and 4 degrees"),
         (["--sigma-p", "0.1", "--sigma-theta", "2"], "'--sigma-theta': expected at most 1.8138, got 2; angles are in radians"),
-        (["--goal", "5", "0"], "'--goal': expected it once, got it twice"),
+        (["--spacing", "1", "--spacing", "2"], "'--spacing': expected it once, got it twice"),
         (["--seed", "1", "--seed", "2", "--seed", "3"], "'--seed': expected it once, got it 3 times"),
         (["--start", "21"], "expected --start as the id of a pose of the file (from 0 to 20) or as X Y, got 21"),
         (["--start", "2.5"], "'--start': expected the id of a pose or X Y in metres, got '2.5'"),
@@ -120,7 +120,8 @@ def test_a_goal_behind_walls(topobelief, office, tmp_path):
         (["--objective", "fame"], "'--objective'"),
         (["--proof", "optimal", "--margin", "-50"], "expected a margin or proof"),
         (["--sigma-p", "0.1"], "expected both --sigma-p and --sigma-theta or neither"),
-        (["--bounds", "paper", "--sigma-p", "1", "--sigma-theta", "1"], 'use bounds="fischer"'),
+        (["--objective", "map", "--bounds", "paper", "--sigma-p", "1", "--sigma-theta", "1"], 'use bounds="fischer"'),
+        (["--bounds", "paper"], 'expected bounds of objective "error" to be one of "fischer", "anchored"'),
         (["--along-trajectory"], "expected one of --map FILE and --along-trajectory"),
         (["--bogus"], "No such option: --bogus"),
     ],

@@ -76,7 +76,7 @@ def answer(proposals: Proposals, decision: Decision, errors: PlanErrors) -> str:
 
 
 def centimetres(*metres: float) -> tuple[str, ...]:
-    """Lengths in centimetres: two digits of the smallest, and up to three decimals where they would look alike.
+    """Lengths in centimetres: two digits of the smallest or more, up to three decimals where that tells them apart.
 
     Examples
     --------

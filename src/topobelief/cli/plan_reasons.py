@@ -21,6 +21,7 @@ from topobelief.position_errors import expected_errors
 from topobelief.wording import closures_in_words
 
 _MOST = 20  # reasons told unasked
+_NARROW = 1e-3  # of a value: bounds that differ by less tell it well enough for a person
 _EQUAL = 1e-6  # of a value: candidates that differ by less are as good
 
 
@@ -35,17 +36,17 @@ def reasons(graph: PoseGraph, start: Start, proposals: Proposals, decision: Deci
 
 def _gain(decision: Decision, index: int, errors: PlanErrors) -> str:
     """How much of the map's error it takes, where that is the objective and known."""
-    value = _value(decision, index) - decision.candidates[index].cost
+    value = _value(decision, index, tolerance=_NARROW) - decision.candidates[index].cost
     if decision.objective != "error" or math.isnan(value) or errors.now is None:
         return ""
     return f", which takes the map's expected error from {' to '.join(centimetres(errors.now.map_rmse, value))} cm"
 
 
-def _value(decision: Decision, index: int) -> float:
-    """The objective with its cost, evaluated or between bounds that coincide; nan where it is not known."""
+def _value(decision: Decision, index: int, *, tolerance: float = _EQUAL) -> float:
+    """The objective with its cost, evaluated or between bounds that all but coincide; nan where it is not known."""
     exact = float(decision.entropies[index]) + decision.candidates[index].cost
     lower, upper = float(decision.lower[index]), float(decision.upper[index])
-    return (lower + upper) / 2 if upper - lower <= _EQUAL * max(abs(lower), abs(upper)) else exact
+    return (lower + upper) / 2 if upper - lower <= tolerance * max(abs(lower), abs(upper)) else exact
 
 
 def _standing(decision: Decision, index: int) -> str:

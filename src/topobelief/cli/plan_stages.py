@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from time import monotonic
@@ -27,6 +26,7 @@ from topobelief.report.tables import candidate_table
 EXACT_SECONDS = 5.0
 """How long exact values that the decision did not need may take, for the picture of the bounds."""
 
+_AT_ONCE = 8  # evaluations: several at once cost hardly more than one
 _LENGTH_BIAS = 0.9  # rank correlation with the number of poses above which the ranking mostly counts them
 _FEWEST_TO_JUDGE = 6  # candidates
 
@@ -80,20 +80,20 @@ def exact_entropies(
     The decision stands without them, so a value that could not be computed is reported and left out.
     """
     values = decision.entropies.copy()
-    if not wanted:
+    missing: list[int] = decision.ranking[np.isnan(values[decision.ranking])].tolist()
+    if not wanted or not missing:
         return values
     begin, failures = monotonic(), list[TopobeliefError]()
     with reporter.stage("exact values") as update:
-        ranking: list[int] = decision.ranking.tolist()
-        for done, action in enumerate(ranking):
+        parts = [missing[first : first + _AT_ONCE] for first in range(0, len(missing), _AT_ONCE)]
+        for done, part in enumerate(parts):
             if monotonic() - begin > EXACT_SECONDS:
                 break
-            if math.isnan(values[action]):
-                try:
-                    values[action] = planner.entropies([actions[action]])[0]
-                except TopobeliefError as error:
-                    failures.append(error)
-            update(done + 1, len(actions))
+            try:
+                values[part] = planner.entropies([actions[action] for action in part])
+            except TopobeliefError as error:
+                failures += [error] * len(part)
+            update(done + 1, len(parts))
     if failures:
         reporter.note(f"exact values in the picture: {len(failures)} of {len(actions)} could not be computed; {failures[0]}")
     known = int(np.count_nonzero(~np.isnan(values))) + len(failures)
@@ -122,7 +122,7 @@ def length_bias_hint(decision: Decision) -> str | None:
         return None
     return (
         f"This ranking mostly counts poses (rank correlation {correlation:.2f}): joint entropy falls with every pose added; "
-        "--objective map compares candidates on the poses that exist now."
+        "--objective error or map compares candidates on the poses that exist now."
     )
 
 
