@@ -192,7 +192,8 @@ def test_resistance_works_with_any_objective_and_any_signature_with_the_error():
         for signature in ("spanning_trees", "von_neumann", "von_neumann_approx", "resistance"):
             decision = Planner(graph, objective=objective, signature=signature).decide(actions, proof="optimal")
             assert decision.proven_optimal
-            assert decision.unit == ("m" if objective == "error" else "nats")
+            units = {"error": "m", "per_pose": "nats per pose"}
+            assert decision.unit == units.get(objective, "nats")
 
 
 def test_families_that_the_error_does_not_have_are_named():
@@ -210,7 +211,7 @@ def test_a_decision_speaks_of_centimetres():
     decision = Planner(graph, engine="scratch", **ERROR).decide(actions)
     assert "can be better by more than" in decision.summary()
     assert " cm" in decision.summary()
-    assert "lower (cm)" in str(decision)
+    assert "bounds of the expected error of the map plus cost in cm" in str(decision)
     assert f"{100 * decision.upper[decision.best]:.2f}" in str(decision)
     assert decision.to_dict()["unit"] == "m"
     assert Decision.from_dict(decision.to_dict()).unit == "m"

@@ -80,7 +80,7 @@ def centimetres(*metres: float) -> tuple[str, ...]:
 
     Examples
     --------
-    >>> centimetres(0.0841, 0.119), centimetres(2.5, 2.5), centimetres(0.0024, 0.0041), centimetres(0.12341, 0.12352)
+    >>> centimetres(0.0841, 0.119), centimetres(2.5, 2.5), centimetres(0.0024, 0.0041), centimetres(0.12341, 0.12348)
     (('8.4', '11.9'), ('250', '250'), ('0.24', '0.41'), ('12.34', '12.35'))
     """
     smallest = 100 * min(metres)
