@@ -23,10 +23,11 @@ from topobelief.arrays import FloatArray, IntArray
 from topobelief.candidates.roadmap import Roadmap
 from topobelief.errors import InvalidInputError, PlanningError, require_choice
 from topobelief.graph.pose_graph import PoseGraph
+from topobelief.linalg.block_cholesky import Int32Array
 from topobelief.search.bound import ClosureRule
 from topobelief.search.criteria import Criterion
 from topobelief.search.information_gain import Slopes, gain_and_slopes
-from topobelief.search.layers import build_layers, longest_path, longest_to_end
+from topobelief.search.layers import arcs_above, build_layers, longest_path
 from topobelief.search.plans import Plan, mixture
 from topobelief.search.reduced_prior import ReducedPrior, reduced_prior
 from topobelief.search.rewards import Course, Rewards, allowed_arcs, odometry_powers, used_records
@@ -34,13 +35,13 @@ from topobelief.search.ways import Ways, find_sightings
 from topobelief.world import World
 
 _OBJECTIVES = ("error", "map", "joint", "per_pose")
-_ARCS = 1_500_000  # aimed at: as many layers as make about so many arcs
+_ARCS = 300_000  # aimed at: as many layers as make about so many arcs
 _FINEST, _COARSEST = 40, 4  # pieces per spacing
 _IDLE = 1e-4  # information of the odometry of idle poses, in that of others, where their number does not count
 _SAME_PLACE = 1e-9  # metres
 _ROUNDING = 1e-9  # relative; bounds are lowered by it
 _LARGEST_SET = 40  # walks whose weights are optimised
-_TOLL_TRIALS = 3  # longest paths a step, to find the price of a metre
+_TOLL_TRIALS = 2  # longest paths a step, to find the price of a metre
 _STEPS_BEFORE_SPLIT = 3
 _SLOW = 0.15  # of what is missing to the best value: a part whose bound rises by less a step is split
 _SLOW_STEPS = 4  # after so many, a part that cannot be split is left as it is
@@ -51,8 +52,8 @@ _LEAST_WEIGHT = 1e-3  # of walks that count where parts are split
 class _Part:
     """Some of the walks: those on paths of these arcs."""
 
-    arcs: IntArray
-    records: IntArray  # of the arcs, each once
+    arcs: Int32Array
+    records: Int32Array  # of the arcs, each once
     courses: list[Course] = field(default_factory=list["Course"])
     weights: FloatArray = field(default_factory=lambda: np.zeros(0))
     bound: float = -math.inf
@@ -76,7 +77,7 @@ class FlowBound:
         self._bound = -math.inf
         self._counter = itertools.count()
         arcs = rewards.layers.arcs
-        every = np.arange(len(arcs.source))
+        every = np.arange(len(arcs.source), dtype=np.int32)
         whole = _Part(every, used_records(arcs, every, len(rewards.layers.records.number)))
         self._open: list[tuple[float, int, _Part]] = [(-math.inf, next(self._counter), whole)]
         self._begin, self._end = rewards.places()
@@ -154,20 +155,20 @@ class FlowBound:
         worth = rewards.of_records(slopes, part.records)
         at_end = -criterion.at_end() / rate if priced else np.zeros(rewards.num_new + 1)
         price = criterion.price / rate if priced else 0.0
-        best: tuple[float, FloatArray, FloatArray, float] | None = None  # D less linear terms, weights, lengths ahead, toll
+        best: tuple[float, FloatArray, float] | None = None  # D less linear terms, lengths ahead, toll
         found: list[Course] = []
         lines: list[tuple[float, float]] = []  # a path's worth without toll, and its length
         toll = part.toll
+        weights = rewards.of_arcs(worth, part.arcs, slopes, price, at_end)
         for _ in range(_TOLL_TRIALS):
-            weights = rewards.of_arcs(worth, part.arcs, slopes, price, toll, at_end)
-            longest = longest_path(layers, part.arcs, weights)
+            longest = longest_path(layers, part.arcs, weights, toll * rewards.driven)
             if longest.value == -math.inf:
                 part.bound, part.arcs = math.inf, part.arcs[:0]
                 return []
             total = longest.value - offset + toll * self._max_length
             course = rewards.course(longest.arcs, slopes)
             if best is None or total < best[0]:
-                best = total, weights, longest.ahead, toll
+                best = total, longest.ahead, toll
             found.append(course)
             lines.append((longest.value + toll * course.plan.length, course.plan.length))
             following = self._next_toll(lines, toll)
@@ -175,7 +176,7 @@ class FlowBound:
                 break
             toll = following
         assert best is not None
-        total, weights, lengths, part.toll = best
+        total, lengths, part.toll = best
         part.ahead = total if not priced else slopes.of(found[-1].plan) - offset
         if priced:
             ahead = part.ahead if part.steps else 0.0
@@ -228,15 +229,11 @@ class FlowBound:
 
     def _thin(self, part: _Part, weights: FloatArray, ahead: FloatArray, threshold: float) -> None:
         """Leave out arcs on no path that is longer than a threshold."""
-        layers, arcs = self._rewards.layers, self._rewards.layers.arcs
-        behind = longest_to_end(layers, part.arcs, weights)
-        target = arcs.target[part.arcs]
-        rest = np.where(target >= 0, behind[target], 0.0)
-        through = ahead[arcs.source[part.arcs]] + weights + rest
-        kept = through > threshold - _ROUNDING * (abs(threshold) + np.abs(weights))
-        if not kept.all():
-            part.arcs = part.arcs[kept]
-            part.records = used_records(arcs, part.arcs, len(layers.records.number))
+        layers = self._rewards.layers
+        kept = arcs_above(layers, part.arcs, weights, part.toll * self._rewards.driven, ahead, threshold)
+        if len(kept) < len(part.arcs):
+            part.arcs = kept
+            part.records = used_records(layers.arcs, kept, len(layers.records.number))
 
     def _reweigh(self, part: _Part, found: list[Course]) -> None:
         """Add walks to the active set and optimise all weights: a concave function over a simplex."""
@@ -318,7 +315,7 @@ class FlowBound:
             kept = [part.arcs[(last < 0) | (last <= count[1])], part.arcs[(last < 0) | (last > count[1])]]
         return [self._restricted(part, arcs) for arcs in kept]
 
-    def _restricted(self, part: _Part, arcs: IntArray) -> _Part:
+    def _restricted(self, part: _Part, arcs: Int32Array) -> _Part:
         """The walks of a part that take these arcs only."""
         layers = self._rewards.layers
         within = np.array([bool(np.isin(course.arcs, arcs, assume_unique=True).all()) for course in part.courses], dtype=bool)

@@ -17,6 +17,7 @@ import numpy as np
 
 from topobelief.arrays import BoolArray, FloatArray, IntArray
 from topobelief.geometry import Group
+from topobelief.linalg.block_cholesky import Int32Array
 from topobelief.linalg.compiled import compiled
 from topobelief.search.information_gain import Slopes
 from topobelief.search.layers import Arcs, Layers, Records
@@ -78,7 +79,7 @@ class Rewards:
     driven: FloatArray
     prices: FloatArray
 
-    def of_records(self, slopes: Slopes, used: IntArray) -> FloatArray:
+    def of_records(self, slopes: Slopes, used: Int32Array) -> FloatArray:
         """Worth of some records, in a table of all of them."""
         worth = np.empty(len(self.layers.records.number))
         on_ways = np.einsum("tab,ceab->cte", slopes.odometry, self.powers)
@@ -89,7 +90,7 @@ class Rewards:
         )  # fmt: skip
         return worth
 
-    def of_arcs(self, worth: FloatArray, which: IntArray, slopes: Slopes, price: float, toll: float, at_end: FloatArray) -> FloatArray:
+    def of_arcs(self, worth: FloatArray, which: Int32Array, slopes: Slopes, price: float, at_end: FloatArray) -> FloatArray:
         """Weights of some arcs.
 
         Parameters
@@ -100,14 +101,12 @@ class Rewards:
         slopes
         price
             Worth of one unit of cost.
-        toll
-            Worth of one metre, beyond its cost.
         at_end : shape (T + 1,)
             What ends a walk after each number of poses.
         """
         idle = np.einsum("tab,ab->t", slopes.odometry, self.idle)
         remaining = np.concatenate([np.cumsum(idle[::-1])[::-1], np.zeros(1)])
-        arcs, charge = self.layers.arcs, price * self.prices + toll * self.driven
+        arcs, charge = self.layers.arcs, price * self.prices
         return _value_arcs(which, arcs.way, arcs.record, arcs.count, arcs.end, arcs.last, worth, charge, remaining + at_end)
 
     def course(self, path: IntArray, slopes: Slopes) -> Course:
@@ -165,18 +164,18 @@ def odometry_powers(group: Group, poses: FloatArray, origin: FloatArray, informa
     return np.stack([turned @ matrix @ at_begin for matrix in (information, middle, shear.T @ information @ shear)])
 
 
-def used_records(arcs: Arcs, which: IntArray, num_records: int) -> IntArray:
+def used_records(arcs: Arcs, which: Int32Array, num_records: int) -> Int32Array:
     """Records of some arcs, each once."""
-    return np.flatnonzero(_marked(which, arcs.record, arcs.count, arcs.end, num_records))
+    return np.flatnonzero(_marked(which, arcs.record, arcs.count, arcs.end, num_records)).astype(np.int32)
 
 
-def allowed_arcs(arcs: Arcs, which: IntArray, allowed: BoolArray) -> IntArray:
+def allowed_arcs(arcs: Arcs, which: Int32Array, allowed: BoolArray) -> Int32Array:
     """Those arcs all of whose records are allowed."""
     return which[_all_allowed(which, arcs.record, arcs.count, arcs.end, allowed)]
 
 
 @compiled
-def _marked(which: IntArray, record: IntArray, count: IntArray, end: IntArray, num_records: int) -> BoolArray:
+def _marked(which: Int32Array, record: Int32Array, count: Int32Array, end: Int32Array, num_records: int) -> BoolArray:
     marked = np.zeros(num_records, np.bool_)
     for a in which:
         for r in range(record[a], record[a] + count[a]):
@@ -187,7 +186,7 @@ def _marked(which: IntArray, record: IntArray, count: IntArray, end: IntArray, n
 
 
 @compiled
-def _all_allowed(which: IntArray, record: IntArray, count: IntArray, end: IntArray, allowed: BoolArray) -> BoolArray:
+def _all_allowed(which: Int32Array, record: Int32Array, count: Int32Array, end: Int32Array, allowed: BoolArray) -> BoolArray:
     result = np.zeros(len(which), np.bool_)
     for i in range(len(which)):
         a = which[i]
@@ -200,10 +199,10 @@ def _all_allowed(which: IntArray, record: IntArray, count: IntArray, end: IntArr
 
 @compiled
 def _value_records(
-    used: IntArray,
-    number: IntArray,
-    way: IntArray,
-    piece: IntArray,
+    used: Int32Array,
+    number: Int32Array,
+    way: Int32Array,
+    piece: Int32Array,
     lengths: FloatArray,
     delta: float,
     on_ways: FloatArray,
@@ -248,12 +247,12 @@ def _value_records(
 
 @compiled
 def _value_arcs(
-    which: IntArray,
-    way: IntArray,
-    record: IntArray,
-    count: IntArray,
-    end: IntArray,
-    last: IntArray,
+    which: Int32Array,
+    way: Int32Array,
+    record: Int32Array,
+    count: Int32Array,
+    end: Int32Array,
+    last: Int32Array,
     worth: FloatArray,
     charge: FloatArray,
     remaining: FloatArray,
