@@ -44,6 +44,7 @@ _LARGEST_SET = 40  # walks whose weights are optimised
 _TOLL_TRIALS = 2  # longest paths a step, to find the price of a metre
 _STEPS_BEFORE_SPLIT = 3
 _SLOW = 0.15  # of what is missing to the best value: a part whose bound rises by less a step is split
+_CONVERGED = 0.25  # of what is missing: a part whose own optimum is known as well as that is split
 _SLOW_STEPS = 4  # after so many, a part that cannot be split is left as it is
 _LEAST_WEIGHT = 1e-3  # of walks that count where parts are split
 
@@ -121,7 +122,7 @@ class FlowBound:
             return []
         _, _, part = heapq.heappop(self._open)
         parts = [part]
-        if part.fresh >= _STEPS_BEFORE_SPLIT and part.slow >= 1:
+        if part.fresh >= _STEPS_BEFORE_SPLIT and part.slow:
             halves = self._split(part)
             if halves is not None:
                 parts = halves
@@ -177,7 +178,7 @@ class FlowBound:
             toll = following
         assert best is not None
         total, lengths, part.toll = best
-        part.ahead = total if not priced else slopes.of(found[-1].plan) - offset
+        part.ahead = total if not priced else max(slopes.of(found[-1].plan) - offset, 0.0)
         if priced:
             ahead = part.ahead if part.steps else 0.0
             rate_now = criterion.least_rate(gain, ahead)
@@ -191,7 +192,9 @@ class FlowBound:
         bound = criterion.to_objective(bound)
         bound -= _ROUNDING * (abs(bound) + abs(criterion.of_gain(0.0)))
         missing = self._best - part.bound
-        slow = bound - part.bound < (_SLOW * missing if math.isfinite(missing) else _SLOW * (value - part.bound))
+        known = math.isfinite(missing)
+        slow = bound - part.bound < _SLOW * (missing if known else value - part.bound)
+        slow = slow or (known and value - bound < _CONVERGED * (self._best - bound))
         part.slow = part.slow + 1 if slow else 0
         part.bound = max(part.bound, bound)
         if math.isfinite(threshold):
@@ -260,7 +263,7 @@ class FlowBound:
             gradient = linear - rate * np.array([slopes.of(plan) for plan in plans])
             return (criterion.of_gain(gained) + float(linear @ weights)) / scale, gradient / scale
 
-        limit = max(self._max_length, float(lengths.min()), float(start @ lengths))
+        limit = max(self._max_length, float(lengths.min()))
         constraints = [
             {"type": "eq", "fun": lambda w: w.sum() - 1, "jac": lambda w: np.ones(len(w))},
             {"type": "ineq", "fun": lambda w: limit - lengths @ w, "jac": lambda w: -lengths},
@@ -270,10 +273,9 @@ class FlowBound:
             options={"maxiter": 8, "ftol": 1e-6},
         )  # fmt: skip
         weights = np.maximum(np.asarray(result.x), 0.0)
-        if np.isfinite(weights).all() and weights.sum() > 0.5 and fun(weights)[0] <= fun(start)[0]:
-            part.weights = weights / weights.sum()
-        else:
-            part.weights = start
+        sound = bool(np.isfinite(weights).all()) and weights.sum() > 0.5
+        shorter = start @ lengths > limit * (1 + _ROUNDING)
+        part.weights = weights / weights.sum() if sound and (shorter or fun(weights)[0] <= fun(start)[0]) else start
 
     def _nothing(self) -> Plan:
         """A plan to begin with: no closures, and odometry as on the first way."""
