@@ -1,10 +1,10 @@
 """The walks of a roadmap as paths through layers of length delta, and longest paths through them.
 
-A walk that has come s metres (from the pose that the robot was at) when it reaches vertex v is at the state (v, k) with
-k delta <= s < (k + 1) delta. A way of length l leads from there to the layer of s + l, one of two: which one depends on where
-in its layer s lies, of which a state knows an interval. So every walk is a path through the layers, and some paths through them
-are no walks: they take the lower layer too often, which saves up to delta a way. What a path is told of the length that it truly
-has (`Arcs.way`) lets whoever weighs arcs charge for it.
+A walk that has come s metres (from the pose that the robot was at) when it reaches vertex v is at the state (v, k) with k
+delta <= s < (k + 1) delta. A way of length l leads from there to the layer of s + l, one of two: which one depends on where
+in its layer s lies, of which a state knows an interval. So every walk is a path through the layers, and some paths through
+them are no walks: they take the lower layer too often, which saves up to delta a way. What a path is told of the length
+that it truly has (`Arcs.way`) lets whoever weighs arcs charge for it.
 
 spacing = m delta. A way from layer k to layer k' drops the new poses t with k < t m <= k', the t-th on the piece t m - k of the
 way (`ways`), whatever s is. The last pose stands at the walk's end.
@@ -181,7 +181,15 @@ def _arcs(
     a = r = 0
     if is_end[first_vertex]:
         if fill:
-            arcs[0, a], arcs[1, a], arcs[2, a], arcs[3, a], arcs[4, a], arcs[5, a], arcs[6, a] = first_vertex, -1, -1, 0, 0, -1, 0
+            arcs[0, a], arcs[1, a], arcs[2, a], arcs[3, a], arcs[4, a], arcs[5, a], arcs[6, a] = (
+                first_vertex,
+                -1,
+                -1,
+                0,
+                0,
+                -1,
+                0,
+            )
         a += 1
     for k in range(num_layers):
         for v in range(num_vertices):

@@ -1,13 +1,14 @@
 """What the arcs of the layers are worth to a gain's slopes, and the plan that a path through them is.
 
-A new pose anywhere on a piece of a way is covered in two steps. It closes loops with poses that its piece sees: with all of them
-or, where at most k are allowed, with k of them; slopes are never negative, so the k largest are an upper bound. Its odometry
+A new pose anywhere on a piece of a way is covered in two steps. It closes loops with poses that its piece sees: with all of
+them or, where at most k are allowed, with k of them; slopes are never negative, so the k largest are an upper bound. Its
+odometry
 
     V(u) = (A_0 + u N A_0)^T Omega (A_0 + u N A_0),   A_0 = Ad(x)^-1 at the beginning of the way, N = Ad(exp(-e_x)) - I,
 
-u metres further along the way, is a convex function of u: it lies below the chord between the ends of the piece. So a mixture of
-two plans, one with each end's odometry, has no less information than the walk, and one of the two is worth as much.
-"""
+u metres further along the way, is a convex function of u: it lies below the chord between the ends of the piece. So a
+mixture of two plans, one with each end's odometry, has no less information than the walk, and one of the two is worth as
+much."""
 
 from __future__ import annotations
 
@@ -20,7 +21,7 @@ from topobelief.geometry import Group
 from topobelief.linalg.block_cholesky import Int32Array
 from topobelief.linalg.compiled import compiled
 from topobelief.search.information_gain import Slopes
-from topobelief.search.layers import Arcs, Layers, Records
+from topobelief.search.layers import Arcs, Layers
 from topobelief.search.plans import Plan
 from topobelief.search.reduced_prior import world_to_body
 from topobelief.search.ways import Sightings, Ways
@@ -133,7 +134,9 @@ class Rewards:
             odometry[t - 1] = max(ends, key=lambda end: float(np.vdot(slopes.odometry[t - 1], end)))
         ways = arcs.way[path]
         ways = ways[ways >= 0]
-        plan = Plan(closures, odometry, float(arcs.last[path[-1]]), float(self.driven[ways].sum()), float(self.prices[ways].sum()))
+        plan = Plan(
+            closures, odometry, float(arcs.last[path[-1]]), float(self.driven[ways].sum()), float(self.prices[ways].sum())
+        )
         return Course(path, records, plan)
 
     def _odometry_at(self, way: int, piece: int) -> list[FloatArray]:
