@@ -130,8 +130,8 @@ class Rewards:
             if self.most and len(seen) > self.most:
                 seen = seen[np.argsort(-slopes.closures[t - 1, seen], kind="stable")[: self.most]]
             closures[t - 1, seen] = 1.0
-            ends = self._odometry_at(e, piece)
-            odometry[t - 1] = max(ends, key=lambda end: float(np.vdot(slopes.odometry[t - 1], end)))
+            ends = np.array(self._odometry_at(e, piece))
+            odometry[t - 1] = ends[np.argmax(np.tensordot(ends, slopes.odometry[t - 1], 2))]
         ways = arcs.way[path]
         ways = ways[ways >= 0]
         plan = Plan(

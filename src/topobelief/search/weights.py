@@ -50,8 +50,11 @@ def best_weights(
     def slopes_of_slack(weights: FloatArray) -> FloatArray:
         return -lengths
 
+    def of_normalised(weights: FloatArray) -> tuple[float, FloatArray]:
+        return function(normalised(weights))
+
     result = _minimize(
-        lambda weights: function(normalised(weights)),
+        of_normalised,
         start,
         jac=True,
         method="SLSQP",
