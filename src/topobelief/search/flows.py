@@ -32,9 +32,9 @@ _ROUNDING = 1e-9  # relative; bounds are lowered by it
 _LARGEST_SET = 40  # walks whose weights are optimised
 _TOLL_TRIALS = 2  # longest paths a step, to find the price of a metre
 _STEPS_BEFORE_SPLIT = 3
-_SLOW = 0.15  # of what is missing to the best value: a part whose bound rises by less a step is split
-_CONVERGED = 0.25  # of what is missing: a part whose own optimum is known as well as that is split
-_SLOW_STEPS = 4  # after so many, a part that cannot be split is left as it is
+_SLOW = 0.15  # of what is missing to the value of the flow: a step that raises the bound by less is slow
+_CONVERGED = 0.25  # of what is missing to the best value: a part whose own optimum is known that well is split
+_SLOW_STEPS = 3  # after so many in a row a part is split too; after twice as many, what cannot be split is left as it is
 _LEAST_WEIGHT = 1e-3  # of walks that count where parts are split
 
 
@@ -52,6 +52,7 @@ class _Part:
     steps: int = 0
     fresh: int = 0  # steps since it was made
     slow: int = 0  # latest steps in a row that hardly raised the bound
+    is_ready: bool = False  # to be split
 
 
 class FlowBound:
@@ -111,11 +112,11 @@ class FlowBound:
             return []
         _, _, part = heapq.heappop(self._open)
         parts = [part]
-        if part.fresh >= _STEPS_BEFORE_SPLIT and part.slow:
+        if part.fresh >= _STEPS_BEFORE_SPLIT and part.is_ready:
             halves = self._split(part)
             if halves is not None:
                 parts = halves
-            elif part.slow >= _SLOW_STEPS:
+            elif part.slow >= 2 * _SLOW_STEPS:
                 self._closed = min(self._closed, part.bound)
                 parts = []
         found: list[IntArray] = []
@@ -180,11 +181,10 @@ class FlowBound:
         value = criterion.to_objective(criterion.of_gain(gain) + criterion.linear(plan))
         bound = criterion.to_objective(bound)
         bound -= _ROUNDING * (abs(bound) + abs(criterion.of_gain(0.0)))
-        missing = self._best - part.bound
-        known = math.isfinite(missing)
-        slow = bound - part.bound < _SLOW * (missing if known else value - part.bound)
-        slow = slow or (known and value - bound < _CONVERGED * (self._best - bound))
-        part.slow = part.slow + 1 if slow else 0
+        missing = self._best - max(part.bound, bound)
+        converged = value - max(part.bound, bound) < _CONVERGED * missing if math.isfinite(missing) else False
+        part.slow = part.slow + 1 if bound - part.bound < _SLOW * abs(value - part.bound) else 0
+        part.is_ready = converged or part.slow >= _SLOW_STEPS
         part.bound = max(part.bound, bound)
         if math.isfinite(threshold):
             self._thin(part, weights, lengths, threshold + offset - part.toll * self._max_length)
