@@ -36,6 +36,7 @@ _SLOW = 0.15  # of what is missing to the value of the flow: a step that raises 
 _CONVERGED = 0.25  # of what is missing to the best value: a part whose own optimum is known that well is split
 _SLOW_STEPS = 3  # after so many in a row a part is split too; after twice as many, what cannot be split is left as it is
 _LEAST_WEIGHT = 1e-3  # of walks that count where parts are split
+_SMALL_WEIGHT = 0.05  # of all walks of the active set, where those that count agree
 
 
 @dataclass(eq=False, slots=True)
@@ -271,8 +272,11 @@ class FlowBound:
         That is the side of a line on which one of the new poses stands, or the number of new poses.
         """
         layers = self._rewards.layers
-        line, count = self._dividing_line(part), self._dividing_number(part)
-        if line is None and count is None:
+        for weights in (part.weights, np.maximum(part.weights, _SMALL_WEIGHT)):
+            line, count = self._dividing_line(part, weights), self._dividing_number(part, weights)
+            if line is not None or count is not None:
+                break
+        else:
             return None
         if count is None or (line is not None and line[0] >= count[0]):
             assert line is not None
@@ -299,7 +303,7 @@ class FlowBound:
         records = used_records(layers.arcs, arcs, len(layers.records.number))
         return _Part(arcs, records, courses, weights, part.bound, part.toll)
 
-    def _dividing_line(self, part: _Part) -> tuple[float, int, FloatArray, float] | None:
+    def _dividing_line(self, part: _Part, shares: FloatArray) -> tuple[float, int, FloatArray, float] | None:
         """Score, number of a new pose, unit vector, and where along it to cut."""
         records = self._rewards.layers.records
         middle = (self._begin + self._end) / 2
@@ -308,7 +312,7 @@ class FlowBound:
         for t in range(1, self._rewards.num_new + 1):
             places: list[FloatArray] = []
             weights: list[float] = []
-            for course, number, weight in zip(part.courses, numbers, part.weights.tolist(), strict=True):
+            for course, number, weight in zip(part.courses, numbers, shares.tolist(), strict=True):
                 at = np.flatnonzero(number == t)
                 if at.size and weight > _LEAST_WEIGHT:
                     places.append(middle[course.records[at[0]]])
@@ -320,12 +324,12 @@ class FlowBound:
                 best = cut[0], t, cut[1], cut[2]
         return best
 
-    def _dividing_number(self, part: _Part) -> tuple[float, int] | None:
+    def _dividing_number(self, part: _Part, shares: FloatArray) -> tuple[float, int] | None:
         """Score, and up to how many new poses the walks of one side have."""
-        used = part.weights > _LEAST_WEIGHT
+        used = shares > _LEAST_WEIGHT
         number = np.array([course.plan.num_poses for course, keep in zip(part.courses, used, strict=True) if keep])
         if len(number) < 2 or np.ptp(number) == 0:
             return None
         spacing = self._rewards.delta * self._rewards.layers.pieces_per_pose
-        cut = best_place(spacing * number, part.weights[used], 0.5 * spacing)
+        cut = best_place(spacing * number, shares[used], 0.5 * spacing)
         return None if cut is None else (cut[0], math.floor(cut[1] / spacing))
