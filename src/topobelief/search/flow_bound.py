@@ -93,6 +93,8 @@ def flow_bound(
     if not (math.isfinite(cost_per_metre) and cost_per_metre >= 0):
         raise InvalidInputError(f"expected a cost of at least 0 a metre, got {cost_per_metre}")
     extra = np.zeros(len(roadmap.edges)) if edge_costs is None else np.asarray(edge_costs, dtype=np.float64)
+    if extra.shape != roadmap.lengths.shape or not (np.isfinite(extra) & (extra >= 0)).all():
+        raise InvalidInputError(f"expected edge_costs of at least 0 for each of {len(roadmap.edges)} edges, got {extra.shape}")
     end = start if return_to_start and goal is None else goal
     to_go = np.zeros(len(roadmap.vertices)) if end is None else roadmap.distances_to(end)
     if not to_go[start] <= max_length * (1 + _ROUNDING):

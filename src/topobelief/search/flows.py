@@ -5,7 +5,8 @@ the flow. Frank-Wolfe: at a flow x the longest path for the gradient is a walk, 
 function says there. The walks found are an active set whose weights are optimised anew at each step.
 
 Flows are in many corridors at once. So the walks are split: those whose t-th new pose stands on one side of a line, and
-those for which it is on the other side. Each part has flows of its own; the least of their bounds is the bound of all."""
+those for which it is on the other side. Each part has flows of its own; the least of their bounds is the bound of all.
+"""
 
 from __future__ import annotations
 
@@ -111,18 +112,19 @@ class FlowBound:
     def step(self) -> list[IntArray]:
         if not self._open:
             return []
-        _, _, part = heapq.heappop(self._open)
+        _, _, part = self._open[0]  # it stays there until its work is done, which may be interrupted
         parts = [part]
         if part.fresh >= _STEPS_BEFORE_SPLIT and part.is_ready:
             halves = self._split(part)
             if halves is not None:
                 parts = halves
             elif part.slow >= 2 * _SLOW_STEPS:
-                self._closed = min(self._closed, part.bound)
-                parts = []
+                self._closed, parts = min(self._closed, part.bound), []
         found: list[IntArray] = []
         for each in parts:
             found.extend(self._improved(each))
+        heapq.heappop(self._open)
+        for each in parts:
             if len(each.arcs) and each.bound < self._best:
                 heapq.heappush(self._open, (each.bound, next(self._counter), each))
         self.num_steps += 1
