@@ -33,6 +33,7 @@ SIGNATURES = {
     "spanning_trees": "spanning trees",
     "von_neumann": "von Neumann entropy",
     "von_neumann_approx": "von Neumann entropy by degrees",
+    "resistance": "effective resistance",
 }
 
 _SETTINGS = {
