@@ -1,0 +1,165 @@
+"""The bound by flows for a graph, a roadmap and a question: what `flows` needs, put together."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from topobelief.candidates.roadmap import Roadmap
+from topobelief.errors import InvalidInputError, PlanningError, require_choice
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.search.bound import ClosureRule
+from topobelief.search.criteria import Criterion
+from topobelief.search.flows import FlowBound
+from topobelief.search.layers import build_layers
+from topobelief.search.reduced_prior import reduced_prior
+from topobelief.search.rewards import Rewards, odometry_powers
+from topobelief.search.ways import Ways, find_sightings
+from topobelief.world import World
+
+_OBJECTIVES = ("error", "map", "joint", "per_pose")
+_ARCS = 400_000  # aimed at: as many layers as make about so many arcs
+_FINEST, _COARSEST = 40, 3  # pieces per spacing
+_IDLE = 1e-4  # information of the odometry of idle poses, in that of others, where their number does not count
+_SAME_PLACE = 1e-9  # metres
+_ROUNDING = 1e-9  # relative; bounds are lowered by it
+
+
+def flow_bound(
+    graph: PoseGraph,
+    roadmap: Roadmap,
+    *,
+    start: int,
+    goal: int | None,
+    max_length: float,
+    objective: str,
+    closures: ClosureRule,
+    spacing: float,
+    information: ArrayLike,
+    world: World | None,
+    cost_per_metre: float = 0.0,
+    return_to_start: bool = False,
+    pose: int | None = None,
+    edge_costs: ArrayLike | None = None,
+    pieces_per_pose: int | None = None,
+) -> FlowBound:
+    """The bound over the walks from one vertex of a roadmap.
+
+    It covers every walk that `predict_actions` makes an action of with these closures, this spacing and information, and no
+    turn, and counts the closures with poses of the map. Closures among the walk's own new poses are not counted.
+
+    Parameters
+    ----------
+    graph
+        At its estimate.
+    roadmap
+    start, goal
+        Vertices of the roadmap. Without a goal walks may end at any vertex, or at the start if they are to return.
+    max_length
+        Metres along the walk.
+    objective
+        "error" (metres), "map", "joint" (nats) or "per_pose" (nats a pose).
+    closures
+    spacing
+        Metres from new pose to new pose.
+    information : shape (kappa, kappa)
+        Of every predicted factor.
+    world
+        What poses must see each other in; None: they always do.
+    cost_per_metre
+        In the unit of the objective.
+    return_to_start
+    pose
+        Of the graph, to which the first new pose is joined. Default: the last one.
+    edge_costs : shape (edges of the roadmap,), optional
+        What driving each edge costs beyond its length, in the unit of the objective: time, energy, risk.
+    pieces_per_pose
+        Into how many layers the spacing is cut. Default: as many as are affordable, from 4 to 40.
+
+    Raises
+    ------
+    InvalidInputError
+        For an unknown objective, or a number out of range.
+    PlanningError
+        Where no walk within the length reaches the goal.
+    """
+    require_choice("objective", objective, _OBJECTIVES)
+    omega = np.asarray(information, dtype=np.float64)
+    pose = graph.num_poses - 1 if pose is None else pose
+    if not (math.isfinite(max_length) and max_length >= 0):
+        raise InvalidInputError(f"expected a length of at least 0 m, got {max_length}")
+    if not (math.isfinite(cost_per_metre) and cost_per_metre >= 0):
+        raise InvalidInputError(f"expected a cost of at least 0 a metre, got {cost_per_metre}")
+    extra = np.zeros(len(roadmap.edges)) if edge_costs is None else np.asarray(edge_costs, dtype=np.float64)
+    if extra.shape != roadmap.lengths.shape or not (np.isfinite(extra) & (extra >= 0)).all():
+        raise InvalidInputError(f"expected edge_costs of at least 0 for each of {len(roadmap.edges)} edges, got {extra.shape}")
+    end = start if return_to_start and goal is None else goal
+    to_go = np.zeros(len(roadmap.vertices)) if end is None else roadmap.distances_to(end)
+    if not to_go[start] <= max_length * (1 + _ROUNDING):
+        raise PlanningError(
+            f"expected a length of at least {to_go[start]:.2f} m, that of the shortest path, got {max_length:g} m; allow more"
+        )
+    from_start = roadmap.distances_to(start)
+    a, b = roadmap.edges.T
+    lengths = roadmap.lengths
+    edges = np.tile(np.arange(len(lengths)), 2)
+    source, target = np.r_[a, b], np.r_[b, a]
+    alive = from_start[source] + lengths[edges] + to_go[target] <= max_length * (1 + _ROUNDING) + _SAME_PLACE
+    alive &= lengths[edges] > 0
+    edges, source, target = edges[alive], source[alive], target[alive]
+    kept = np.unique(np.concatenate([source, target, [start]]))
+    vertices = np.concatenate([kept, [-1]])  # the last one: the pose where the robot is
+    place = np.full(len(roadmap.vertices), -1)
+    place[kept] = np.arange(len(kept))
+    at_pose, begin = len(kept), graph.positions[pose, :2]
+    lead_in = float(np.linalg.norm(roadmap.vertices[start] - begin))
+    has_lead = lead_in > _SAME_PLACE
+    lead = [at_pose] if has_lead else []
+    points = np.concatenate([roadmap.vertices[kept], begin[None]])
+    source = np.r_[place[source], lead].astype(np.int64)
+    target = np.r_[place[target], [place[start]] if has_lead else []].astype(np.int64)
+    ways = Ways(source, target, points[source], points[target], np.linalg.norm(points[target] - points[source], axis=1))
+    if len(ways.source) == 0:
+        raise PlanningError(f"expected a roadmap with a way of at most {max_length:g} m from the start, got none; allow more")
+    driven = np.r_[lengths[edges], [0.0] if has_lead else []]
+    prices = np.r_[cost_per_metre * lengths[edges] + extra[edges], [0.0] if has_lead else []]
+    whole = max_length + (lead_in if has_lead else 0.0)
+    is_end = np.ones(len(points), dtype=bool)
+    if end is not None:
+        is_end[:] = vertices == end
+    is_end[at_pose] = False
+    remaining = np.concatenate([to_go[kept], [lead_in + to_go[start]]])
+    if pieces_per_pose is None:
+        slack = max_length - from_start[vertices[source[: len(edges)]]] - lengths[edges] - to_go[vertices[target[: len(edges)]]]
+        per_metre = 1.5 * float(np.maximum(slack, 0.0).sum())  # arcs, for layers of one metre
+        pieces_per_pose = int(np.clip(_ARCS * spacing / max(per_metre, 1e-9), _COARSEST, _FINEST))
+    delta = spacing / pieces_per_pose
+    first_vertex = at_pose if has_lead else int(place[start])
+    layers = build_layers(ways, first_vertex, remaining, is_end, whole, delta, pieces_per_pose)
+    num_new = max(1, int(layers.records.number.max(initial=1)))
+    sightings = find_sightings(graph, ways, pose, delta, closures, world, num_new)
+    seen = sightings.seen if len(sightings.seen) else np.array([pose])
+    prior = reduced_prior(
+        graph,
+        pose,
+        seen,
+        omega,
+        probability=closures.probability,
+        min_index_gap=closures.min_index_gap,
+        with_errors=objective == "error",
+    )
+    powers = odometry_powers(graph.group, ways.poses(graph, pose), graph.positions[pose], omega)
+    idle = powers[0, 0] * (_IDLE if objective in ("error", "map") else 1.0)
+    fewest = max(0, math.ceil((whole - max_length + to_go[start]) / spacing - 1e-6))
+    criterion = Criterion.of(objective, prior, idle, num_new, fewest)
+    most = closures.max_per_pose or 0
+    rewards = Rewards(layers, ways, sightings, delta, powers, idle, prior.earliest, most, num_new, driven, prices)
+    covers = (
+        f"every walk of the roadmap of at most {max_length:.6g} m"
+        + (" to the goal" if goal is not None else " that returns to its start" if return_to_start else "")
+        + ", counting loop closures with the poses of the map, not those among its own new poses; by flows in layers of "
+        f"{100 * delta:.3g} cm"
+    )
+    return FlowBound(prior, criterion, rewards, vertices, max_length, covers)
