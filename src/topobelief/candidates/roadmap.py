@@ -113,6 +113,24 @@ class Roadmap:
         """Length of the shortest way from each vertex, shape (V,); inf where there is none."""
         return _dijkstra(self._adjacency[0], indices=target)
 
+    def shortest_ways(self, sources: ArrayLike) -> tuple[FloatArray, IntArray]:
+        """Shortest ways from some vertices to all.
+
+        Parameters
+        ----------
+        sources : shape (S,)
+            Vertices.
+
+        Returns
+        -------
+        lengths : shape (S, V)
+            Metres; inf where there is no way.
+        previous : shape (S, V)
+            The vertex before each on its way; negative at the source and where there is no way.
+        """
+        lengths, previous = _dijkstra(self._adjacency[0], indices=np.asarray(sources), return_predecessors=True)
+        return lengths, previous.astype(np.int64)
+
     def between(self, start: ArrayLike, goal: ArrayLike) -> Roadmap:
         """The same roadmap for another start and goal, which join it as its first two vertices.
 

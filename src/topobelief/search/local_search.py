@@ -1,0 +1,262 @@
+"""Local search over via-vertices: good walks, found by small changes to the good walks found before.
+
+A walk is the chain of shortest ways between its via-vertices (`walks`). Its neighbours come from
+
+- insertion: one more via-vertex, anywhere in the order;
+- replacement: another one in the place of one, near or far;
+- omission of one, exchange of two;
+- recombination: the first part of one walk up to a vertex, and the second part of another walk from there.
+
+The search keeps all walks that it has evaluated. The *leaders* are the best of them that differ from each other, and some of the
+best at shorter lengths, which have room for insertions. Neighbours of the first leader that has any left are evaluated, a
+batch at a time, most promising first: insertions whose via-vertex has gained most per metre so far. The search rests when all
+neighbours of all leaders are known; from then on it starts again from a leader some of whose via-vertices are replaced by random
+ones.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from topobelief.arrays import FloatArray, IntArray
+from topobelief.candidates.distinct_paths import DistinctPaths
+from topobelief.search.evaluations import Evaluations
+from topobelief.search.front import on_front
+from topobelief.search.walks import Walk, Walks
+
+Vias = tuple[int, ...]
+
+_NUM_LEADERS = 6
+_NUM_SHORTER = 6  # leaders at shorter lengths
+_DIFFERENT = 0.05  # share of the length limit by which leaders differ (Fréchet)
+_NUM_NEAR = 8  # vertices near a via-vertex that may replace it
+_NUM_LANDMARKS = 16
+
+
+class LocalSearch:
+    """Improves the best walk, a batch of evaluations at a time.
+
+    Parameters
+    ----------
+    walks
+    evaluations
+        Walks that are there already take part.
+    candidates
+        Vertices to lead walks through.
+    rng
+    """
+
+    def __init__(self, walks: Walks, evaluations: Evaluations, candidates: IntArray, *, rng: np.random.Generator) -> None:
+        self._walks, self._evaluations, self._rng = walks, evaluations, rng
+        self._candidates = candidates[walks.in_reach[candidates]]
+        reachable = np.flatnonzero(walks.in_reach)
+        self._reachable, self._near = reachable, KDTree(walks.roadmap.vertices[reachable])
+        self._landmarks = walks.roadmap.vertices[reachable[np.linspace(0, len(reachable) - 1, _NUM_LANDMARKS).astype(int)]]
+        self._yield: dict[int, float] = {}  # most that inserting a via-vertex gained, per metre
+        self._left: dict[Walk, Iterator[list[_Change]]] = {}
+        self._exhausted: set[Walk] = set()
+
+    def seed(self, walks: Iterable[Walk]) -> None:
+        """Evaluate walks that come from elsewhere; they take part from now on."""
+        self._evaluations.evaluate([walk for walk in walks if self._fits(walk)])
+
+    def step(self, size: int) -> int:
+        """Evaluate about `size` neighbours of leaders.
+
+        Returns
+        -------
+        int
+            How many walks were evaluated; 0 when all neighbours of all leaders are known.
+        """
+        before = len(self._evaluations)
+        for leader in self._leaders():
+            while leader not in self._exhausted:
+                if leader not in self._left:
+                    self._left[leader] = self._batches(leader, size)
+                batch = next(self._left[leader], None)
+                if batch is None:
+                    self._exhausted.add(leader)
+                    break
+                self._try(leader, batch)
+                if len(self._evaluations) > before:
+                    return len(self._evaluations) - before
+        return 0
+
+    def restart(self, size: int) -> int:
+        """Replace some via-vertices of a leader by random ones, and climb from there; returns how many walks were evaluated."""
+        before = len(self._evaluations)
+        leaders = self._leaders()
+        leader = leaders[int(self._rng.integers(len(leaders)))]
+        vias = self._shaken(self._walks.vias(leader))
+        walk = self._walks.walk(vias)
+        self._evaluations.evaluate([walk])
+        improved = True
+        while improved:
+            improved = False
+            for batch in self._batches(walk, size):
+                walks = [self._walks.walk(change.vias) for change in batch]
+                self._evaluations.evaluate(walks)
+                best = min(walks, key=self._evaluations.value, default=walk)
+                if self._evaluations.value(best) < self._evaluations.value(walk):
+                    walk, improved = best, True
+                    break
+        return len(self._evaluations) - before
+
+    def _shaken(self, vias: Vias) -> Vias:
+        kept = [via for via in vias if self._rng.random() < 0.5]
+        for _ in range(2):
+            changes = [change for change in self._insertions(tuple(kept))]
+            if changes:
+                kept = list(changes[int(self._rng.integers(len(changes)))].vias)
+        return tuple(kept)
+
+    def _fits(self, walk: Walk) -> bool:
+        return float(self._walks.lengths_along(walk)[-1]) <= self._walks.limit
+
+    def _try(self, leader: Walk, batch: list[_Change]) -> None:
+        walks = [change.walk or self._walks.walk(change.vias) for change in batch]
+        self._evaluations.evaluate(walks)
+        value, length = self._evaluations.value(leader), self._evaluations.lengths[leader]
+        for change, walk in zip(batch, walks, strict=True):
+            if change.inserted is not None:
+                metres = max(self._evaluations.lengths[walk] - length, 0.02 * self._walks.max_length)
+                gain = (value - self._evaluations.value(walk)) / metres
+                self._yield[change.inserted] = max(gain, self._yield.get(change.inserted, -np.inf))
+
+    def _leaders(self) -> list[Walk]:
+        """The best walks that differ from each other, then some of the best at shorter lengths."""
+        walks, lengths, objectives = self._evaluations.arrays()
+        values = objectives + self._evaluations.cost_per_metre * lengths
+        leaders = self._different(walks, np.argsort(values, kind="stable"), _NUM_LEADERS)
+        shorter = on_front(lengths, values)
+        spread = np.unique(np.linspace(0, len(shorter) - 1, min(len(shorter), _NUM_SHORTER)).astype(int))
+        return list(dict.fromkeys([*leaders, *(walks[index] for index in shorter[spread])]))
+
+    def _different(self, walks: list[Walk], order: IntArray, count: int) -> list[Walk]:
+        """The first walks of an order that differ from those before."""
+        kept, distinct = [], DistinctPaths(self._landmarks)
+        for index in order[: 40 * count].tolist():
+            path = self._evaluations.path(walks[index])
+            if not distinct.any_within(path, _DIFFERENT * self._walks.max_length):
+                distinct.add(path)
+                kept.append(walks[index])
+                if len(kept) == count:
+                    break
+        return kept
+
+    def _batches(self, walk: Walk, size: int) -> Iterator[list[_Change]]:
+        """Neighbours of a walk, most promising first."""
+        vias = self._walks.vias(walk)
+        changes = itertools.chain(
+            self._omissions(vias),
+            self._insertions(vias),
+            self._replacements(vias),
+            self._exchanges(vias),
+            self._recombinations(walk),
+        )
+        while batch := list(itertools.islice(changes, size)):
+            yield batch
+
+    def _insertions(self, vias: Vias) -> list[_Change]:
+        """One more via-vertex, in each place where it is within the length."""
+        stops = self._walks.stops(vias)
+        self._walks.prepare(stops)
+        length = self._walks.length(vias)
+        found: list[tuple[float, _Change]] = []
+        places = len(stops) if self._walks.end is None else len(stops) - 1
+        for place in range(places):
+            extra = self._walks.distances(stops[place])[self._candidates]
+            if place + 1 < len(stops):
+                extra = extra + self._walks.distances(stops[place + 1])[self._candidates]
+                extra = extra - self._walks.distances(stops[place])[stops[place + 1]]
+            fits = length + extra <= self._walks.limit
+            for via, metres in zip(self._candidates[fits].tolist(), extra[fits].tolist(), strict=True):
+                rank = self._yield.get(via, np.inf) / max(metres, 0.02 * self._walks.max_length)
+                rank = self._yield.get(via, np.inf)
+                found.append((-rank, _Change((*vias[:place], via, *vias[place:]), inserted=via)))
+        found.sort(key=lambda each: each[0])
+        return [change for _, change in found]
+
+    def _replacements(self, vias: Vias) -> Iterator[_Change]:
+        """Another via-vertex in the place of one: first those near it, then all candidates."""
+        for place, via in enumerate(vias):
+            for other in self._neighbours(via):
+                yield from self._within((*vias[:place], other, *vias[place + 1 :]))
+        for place in range(len(vias)):
+            rest = (*vias[:place], *vias[place + 1 :])
+            for change in self._insertions_at(rest, place):
+                yield change
+
+    def _insertions_at(self, vias: Vias, place: int) -> list[_Change]:
+        return [change for change in self._insertions(vias) if change.vias[:place] == vias[:place] and change.vias[place + 1 :] == vias[place:]]
+
+    def _neighbours(self, via: int) -> list[int]:
+        _, near = self._near.query(self._walks.roadmap.vertices[via], k=min(_NUM_NEAR + 1, len(self._reachable)))
+        return [vertex for vertex in self._reachable[np.atleast_1d(near)].tolist() if vertex != via]
+
+    def _omissions(self, vias: Vias) -> Iterator[_Change]:
+        for place in range(len(vias)):
+            yield from self._within((*vias[:place], *vias[place + 1 :]))
+
+    def _exchanges(self, vias: Vias) -> Iterator[_Change]:
+        """Two via-vertices in each other's place, and the part between two of them backwards."""
+        for first, last in itertools.combinations(range(len(vias)), 2):
+            yield from self._within((*vias[:first], vias[last], *vias[first + 1 : last], vias[first], *vias[last + 1 :]))
+            if last > first + 2:
+                yield from self._within((*vias[:first], *vias[first : last + 1][::-1], *vias[last + 1 :]))
+
+    def _recombinations(self, walk: Walk) -> Iterator[_Change]:
+        """The first part of one leader and the last part of another, joined at a vertex of both."""
+        so_far = self._walks.lengths_along(walk)
+        for other in self._leaders():
+            if other == walk:
+                continue
+            others_so_far = self._walks.lengths_along(other)
+            at = {vertex: index for index, vertex in enumerate(other)}
+            joints = [(index, at[vertex]) for index, vertex in enumerate(walk) if vertex in at]
+            for i, j in joints:
+                for new, length in (
+                    (walk[: i + 1] + other[j + 1 :], so_far[i] + others_so_far[-1] - others_so_far[j]),
+                    (other[: j + 1] + walk[i + 1 :], others_so_far[j] + so_far[-1] - so_far[i]),
+                ):
+                    if length <= self._walks.limit:
+                        yield _Change((), walk=new)
+
+    def _within(self, vias: Vias) -> Iterator[_Change]:
+        if self._walks.length(vias) <= self._walks.limit:
+            yield _Change(vias)
+
+
+class _Change:
+    """A neighbour of a walk, by its via-vertices or as a walk."""
+
+    __slots__ = ("inserted", "vias", "walk")
+
+    def __init__(self, vias: Vias, *, inserted: int | None = None, walk: Walk | None = None) -> None:
+        self.vias, self.inserted, self.walk = vias, inserted, walk
+
+
+def spread_vias(walks: Walks, useful: Sequence[bool] | FloatArray, count: int) -> IntArray:
+    """Vertices all over what is in reach, to lead walks through.
+
+    Parameters
+    ----------
+    walks
+    useful : shape (V,), bool
+        Vertices that may be taken.
+    count
+        How many at most: each is as far as can be from those before it.
+    """
+    vertices = np.flatnonzero(walks.in_reach & np.asarray(useful, dtype=bool))
+    places = walks.roadmap.vertices[vertices]
+    if len(vertices) <= count:
+        return vertices
+    chosen, distance = [0], np.linalg.norm(places - places[0], axis=1)
+    while len(chosen) < count:
+        chosen.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, np.linalg.norm(places - places[chosen[-1]], axis=1))
+    return vertices[np.array(chosen)]
