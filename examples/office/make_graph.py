@@ -36,7 +36,9 @@ def driven(world: tb.World, *, seed: int) -> tb.PoseGraph:
     for goal in TOUR:
         roadmap = tb.build_roadmap(world, graph.poses[-1], goal, seed=seed)
         paths = tb.diverse_paths(roadmap, graph.poses[-1], goal, num_paths=1, seed=seed)
-        (leg,) = tb.predict_actions(graph, paths, information=information, spacing=SPACING, world=world)
+        (leg,) = tb.predict_actions(
+            graph, paths, information=information, spacing=SPACING, turn=None, closures=tb.ClosureModel.by_hand(), world=world
+        )
         graph = tb.posterior(graph, leg)
     return graph
 

@@ -10,6 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from topobelief import Action, PoseGraph, posterior
+from topobelief.candidates.closures import ClosureModel
+from topobelief.candidates.learned_closures import learn_closures
 from topobelief.candidates.polyline import path_length
 from topobelief.candidates.predicted_factors import default_information, predict_actions
 from topobelief.errors import InvalidInputError, PlanningError
@@ -29,7 +31,9 @@ def closures(action: Action) -> set[tuple[int, int]]:
 
 
 def predict(graph: PoseGraph, path: list[tuple[float, float]] | np.ndarray, **rules: object) -> Action:
-    return predict_actions(graph, [path], **rules)[0]
+    """The action of a path by a rule by hand, with poses by distance only unless a turn is given."""
+    by_hand = {"closure_radius": 2.0} if not {"closures", "closure_radius"} & rules.keys() else {}
+    return predict_actions(graph, [path], **{"turn": None, **by_hand, **rules})[0]
 
 
 ORIGIN = drive([(0, 0)])
@@ -140,10 +144,102 @@ class TestEdges:
 
     def test_each_path_makes_an_action_of_its_own(self) -> None:
         graph = drive([(0, 0), (1, 0)])
-        actions = predict_actions(graph, [[(1, 0), (4, 0)], np.array([(1.0, 0.0), (1.0, 2.0)])])
+        actions = predict_actions(graph, [[(1, 0), (4, 0)], np.array([(1.0, 0.0), (1.0, 2.0)])], turn=None)
         assert [action.label for action in actions] == ["path 0", "path 1"]
         assert [action.num_new_poses for action in actions] == [3, 2]
         assert predict_actions(graph, []) == []
+
+
+class TestTurns:
+    """New poses where the path turns, on a drive along x that ends at the origin."""
+
+    GRAPH = drive([(-1, 0), (0, 0)])
+    QUARTER = np.pi / 2
+
+    def test_a_sharp_corner_has_a_pose_for_each_turn_and_distances_count_from_the_last(self) -> None:
+        poses = predict(self.GRAPH, [(0, 0), (2.5, 0), (2.5, 2)], turn=np.pi / 6).poses
+        corner = [(2.5, 0, np.pi / 6), (2.5, 0, np.pi / 3), (2.5, 0, self.QUARTER)]
+        expected = [(1, 0, 0), (2, 0, 0), *corner, (2.5, 1, self.QUARTER), (2.5, 2, self.QUARTER)]
+        np.testing.assert_allclose(poses, expected, atol=1e-12)
+
+    def test_slight_bends_add_up_to_a_turn_since_the_last_pose(self) -> None:
+        """Three bends of 10 degrees, 0.2 m apart: the second makes 20, the third 10 again."""
+        headings = np.radians([0, 10, 20, 30])
+        path = np.vstack([(0, 0), np.cumsum(0.2 * np.column_stack([np.cos(headings), np.sin(headings)]), axis=0)])
+        poses = predict(self.GRAPH, path, turn=math.radians(15)).poses
+        np.testing.assert_allclose(np.degrees(poses[:, 2]), [15, 30, 30], atol=1e-9)
+        np.testing.assert_allclose(poses[:, :2], [path[2], path[3], path[4]], atol=1e-12)
+
+    def test_bends_to_and_fro_cancel(self) -> None:
+        path = [(0, 0), (0.4, 0.05), (0.8, 0), (1.2, 0.05), (1.6, 0)]
+        assert len(predict(self.GRAPH, path, turn=math.radians(15)).poses) == 2
+
+    def test_the_robot_turns_into_the_path_where_it_stands(self) -> None:
+        poses = predict(self.GRAPH, [(0, 0), (-1, 0)], turn=self.QUARTER).poses
+        np.testing.assert_allclose(np.abs(poses[:, 2]), [self.QUARTER, np.pi, np.pi], atol=1e-12)
+        np.testing.assert_allclose(poses[:, :2], [(0, 0), (0, 0), (-1, 0)], atol=1e-12)
+
+    def test_in_space_as_in_the_plane(self) -> None:
+        poses = np.array([[x, 0, 3, 0, 0, np.sin(0.4), np.cos(0.4)] for x in (-1, 0)])
+        graph = PoseGraph(poses, [(0, 1)], None, np.eye(6))
+        path = [(0, 0), (2.5, 0), (2.5, 2)]
+        flat = predict(drive([(-1, 0), (0, 0)], theta=0.8), path, turn=0.3).poses
+        action = predict(graph, path, turn=0.3)
+        np.testing.assert_allclose(action.poses[:, :2], flat[:, :2], atol=1e-12)
+        np.testing.assert_allclose(2 * np.arctan2(action.poses[:, 5], action.poses[:, 6]), flat[:, 2], atol=1e-12)
+
+    @pytest.mark.parametrize("turn", [0, -1, math.nan])
+    def test_a_turn_that_is_none_is_refused(self, turn: float) -> None:
+        with pytest.raises(InvalidInputError, match="expected turn above 0"):
+            predict(self.GRAPH, [(0, 0), (1, 0)], turn=turn)
+
+
+class TestClosureModel:
+    """Out along y = 0 to x = 10 and back along y = 1."""
+
+    GRAPH = drive([(x, 0) for x in range(11)])
+    BACK = ((10, 0), (10, 1), (0, 1))
+
+    def test_limits_the_closures_of_each_new_pose_and_weighs_them(self) -> None:
+        action = predict(self.GRAPH, list(self.BACK), closures=ClosureModel(max_per_pose=2, probability=0.25))
+        made = action.edges[action.num_new_poses :]
+        assert np.bincount(made[:, 0])[13:].tolist() == [2] * 9
+        assert action.probabilities is not None
+        assert action.probabilities.tolist() == [1.0] * action.num_new_poses + [0.25] * len(made)
+        assert (action.information[: action.num_new_poses] == OMEGA).all()
+        assert (action.information[action.num_new_poses :] == 0.25 * OMEGA).all()
+
+    def test_is_learned_from_the_graph_where_none_is_given(self) -> None:
+        graph = PoseGraph(
+            np.column_stack([np.r_[0:11, 10:-1:-1], np.r_[[0] * 11, [1] * 11], np.zeros(22)]),
+            [*((i, i + 1) for i in range(21)), *((21 - i, i) for i in range(8))],
+            None,
+            OMEGA,
+        )
+        path = [(0, 1), (0, 0.5), (10, 0.5)]
+        learned = predict_actions(graph, [path])[0]
+        stated = predict_actions(graph, [path], closures=learn_closures(graph))[0]
+        assert learned.edges.tolist() == stated.edges.tolist()
+        assert learned.num_closures > 0
+        assert np.array_equal(learned.information, stated.information)
+
+    def test_prior_poses_come_first_then_new_ones_up_to_the_limit(self) -> None:
+        """There and back where the prior has one pose: it, then what the robot has left on its way out."""
+        path = [(0, 0), (8, 0), (0, 0.5)]
+        graph = drive([(-1, 0), (0, 0)])
+        for limit, most in ((1, 1), (2, 2), (3, 3)):
+            model = ClosureModel(max_per_pose=limit, probability=1.0, min_index_gap=4)
+            action = predict(graph, path, closures=model)
+            made = action.edges[action.num_new_poses :]
+            assert np.bincount(made[:, 0]).max() == most
+            last = made[made[:, 0] == made[:, 0].max(), 1]
+            assert (last < 2).any()
+            assert (made[:, 1] >= 2).any()
+            assert (made[:, 0] - made[:, 1] >= 4).all()
+
+    def test_and_a_rule_by_hand_are_one_too_many(self) -> None:
+        with pytest.raises(InvalidInputError, match="closures or a rule by hand, got both; leave out min_index_gap"):
+            predict(self.GRAPH, list(self.BACK), closures=ClosureModel(), min_index_gap=3)
 
 
 class TestStart:

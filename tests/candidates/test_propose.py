@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from topobelief.candidates.closures import ClosureModel
 from topobelief.candidates.diverse_paths import diverse_paths
 from topobelief.candidates.polyline import path_length
 from topobelief.candidates.predicted_factors import predict_actions
@@ -28,9 +29,8 @@ RULE = CandidateRule(
     robot_radius=0.3,
     seed=3,
     spacing=0.8,
-    closure_radius=1.5,
-    closure_angle=1.0,
-    min_index_gap=3,
+    turn=0.5,
+    closures=ClosureModel(1.5, 1.0, 3, max_per_pose=2, probability=0.3),
 )
 
 
@@ -54,7 +54,7 @@ def by_hand():
 def test_every_number_of_the_rule_reaches_its_part(by_hand):
     found = propose(GRAPH, WORLD, GRAPH.positions[-1], GOAL, RULE)
     assert [path.tolist() for path in found.paths] == [path.tolist() for path in by_hand]
-    expected = predict_actions(GRAPH, by_hand, spacing=0.8, closure_radius=1.5, closure_angle=1.0, min_index_gap=3, world=WORLD)
+    expected = predict_actions(GRAPH, by_hand, spacing=0.8, turn=0.5, closures=RULE.closures, world=WORLD)
     assert same(found.actions, expected)
     assert found.lengths.tolist() == [path_length(path) for path in by_hand] == sorted(found.lengths)
     assert len(found.routes.roadmap.vertices) >= 120
@@ -71,7 +71,7 @@ def test_the_two_halves_are_the_whole(by_hand):
 
 def test_line_of_sight_is_a_choice():
     def num_closures(line_of_sight):
-        rule = dataclasses.replace(RULE, closure_radius=6.0, line_of_sight=line_of_sight)
+        rule = dataclasses.replace(RULE, closures=ClosureModel.by_hand(closure_radius=6.0), line_of_sight=line_of_sight)
         return sum(action.num_closures for action in propose(GRAPH, WORLD, GRAPH.positions[-1], GOAL, rule).actions)
 
     assert num_closures(False) > num_closures(True)

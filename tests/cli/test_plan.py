@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from data_files import data_file
+from topobelief.candidates.closures import ClosureModel
 from topobelief.candidates.diverse_paths import diverse_paths
+from topobelief.candidates.learned_closures import learn_closures
 from topobelief.candidates.polyline import path_length
 from topobelief.candidates.predicted_factors import predict_actions
 from topobelief.candidates.roadmap import build_roadmap
@@ -116,16 +118,39 @@ def test_exact_values_stop_when_their_time_is_over(by_hand, monkeypatch, capsys)
 
 
 def test_the_paper_rule_is_one_option_and_gives_way_to_others(topobelief, office):
-    names = ("closure_angle", "min_index_gap", "line_of_sight", "max_detour")
 
     def settings(*options: object) -> tuple:
         chosen = document(topobelief, office.plan("--candidates", 2, "--proof", "none", *options))["options"]
-        return tuple(chosen[name] for name in names)
+        rule = ClosureModel(**chosen["closures"])
+        return (
+            rule.angle,
+            rule.min_index_gap,
+            rule.max_per_pose,
+            chosen["turn"],
+            chosen["line_of_sight"],
+            chosen["max_detour"],
+        )
 
-    assert settings() == (math.pi, 5, True, 1.3)
-    assert settings("--paper") == (1.0, 2, False, None)
-    assert settings("--paper", "--min-index-gap", 4, "--line-of-sight", "--max-detour", 2) == (1.0, 4, True, 2.0)
-    assert settings("--max-detour", "none") == (math.pi, 5, True, None)
+    fifteen = math.radians(15)
+    assert settings("--closures", "by-hand") == (math.pi, 5, None, fifteen, True, 1.3)
+    assert settings("--paper") == (1.0, 2, None, None, False, None)
+    assert settings("--paper", "--min-index-gap", 4, "--line-of-sight", "--max-detour", 2) == (1.0, 4, None, None, True, 2.0)
+    assert settings("--max-detour", "none", "--closure-radius", 3) == (math.pi, 5, None, fifteen, True, None)
+    assert settings("--closures", "paper", "--closure-angle", 0.5) == (0.5, 2, None, fifteen, True, 1.3)
+
+
+def test_closures_are_learned_from_the_graph_and_said_in_one_line(topobelief, office, by_hand):
+    outcome = topobelief(office.plan("--candidates", 2, "--proof", "none"))
+    model = learn_closures(by_hand[0], world=read_world(office.map_file))
+    assert f"\n{model}\n" in outcome.out
+    chosen = document(topobelief, office.plan("--candidates", 2, "--proof", "none"))["options"]["closures"]
+    assert ClosureModel(**chosen) == model
+
+
+def test_numbers_for_closures_that_are_learned_are_refused(topobelief, office):
+    outcome = topobelief(office.plan("--closures", "learned", "--closure-radius", 2))
+    assert outcome.code == 2
+    assert "expected --closures learned without numbers" in outcome.err
 
 
 def test_the_noise_of_predicted_factors_can_be_given(topobelief, office):
@@ -148,7 +173,7 @@ def test_optimal_is_proven_and_a_margin_is_judged(topobelief, office):
         ("--objective", "per_pose"),
         ("--signature", "von_neumann"),
         ("--signature", "von_neumann_approx", "--normalized"),
-        ("--bounds", "paper", "--determinant", "hadamard"),
+        ("--bounds", "paper", "--determinant", "hadamard", "--closures", "paper"),
         ("--proof", "none"),
     ],
 )

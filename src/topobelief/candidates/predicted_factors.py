@@ -1,42 +1,46 @@
 """What driving along a path would add to the pose graph: new poses, odometry between them, and loop closures.
 
-The rules are those of the paper's simulations (Kitanov and Indelman, arXiv 1903.00927, section V): a pose every so many
-metres, a closure between two poses that are near each other in space and heading but not in time. Its numbers are
-1.0 m, 2.0 m, 1.0 rad and an index gap of 2, with no test of whether the two see each other; the defaults here suit a
-lidar that looks all around.
+New poses stand where a front end would put them (`new_poses`), and close loops as a `ClosureModel` says, learned from the graph
+unless it is given.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial import KDTree
 
 from topobelief.arrays import FloatArray, IntArray
-from topobelief.candidates.polyline import checked_path, path_length, stations
+from topobelief.candidates.closures import ClosureModel, closures_among, closures_with_prior
+from topobelief.candidates.learned_closures import learn_closures
+from topobelief.candidates.new_poses import poses_along
+from topobelief.candidates.polyline import checked_path, path_length
 from topobelief.candidates.start import Start, find_start
-from topobelief.errors import InvalidInputError, PlanningError, degrees_hint
+from topobelief.errors import InvalidInputError, PlanningError
 from topobelief.graph.action import Action
 from topobelief.graph.information import shared_information
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.world import World
 
 _ROUNDING = 1e-9  # relative: what differs by less counts as equal
+KEY_POSE_TURN = math.radians(15)
+"""Radians by which a path turns from new pose to new pose, as in our simulated front end."""
 
 
 def predict_actions(
     graph: PoseGraph,
     paths: Sequence[ArrayLike],
     *,
+    closures: ClosureModel | None = None,
     information: ArrayLike | None = None,
     spacing: float = 1.0,
-    closure_radius: float = 2.0,
-    closure_angle: float = math.pi,
-    min_index_gap: int = 5,
+    turn: float | None = KEY_POSE_TURN,
+    closure_radius: float | None = None,
+    closure_angle: float | None = None,
+    min_index_gap: int | None = None,
     world: World | None = None,
     start: int | ArrayLike | Start | None = None,
 ) -> list[Action]:
@@ -48,18 +52,18 @@ def predict_actions(
         In SE(2), or in SE(3) with z up: there a path is driven upright at the height of the pose where it starts.
     paths
         Each of shape (waypoints, 2), metres. A path that does not begin at the start is led there straight.
+    closures
+        Which loops the new poses close. Default: learned from the graph (`learn_closures`), in the `world` that is given.
     information : shape (kappa, kappa), optional
-        Of every predicted factor. Default: `default_information(graph)`.
+        Of a measurement. Default: `default_information(graph)`. A predicted closure carries `closures.probability` times this.
     spacing
         Metres along the path from pose to pose; the last step, to the path's end, is shorter.
-    closure_radius
-        Poses nearer than this close a loop, metres. At exactly this distance (to 1e-9 of it) they do not, so that two
-        poses back on a straight path at 1.0 m never are a closure within 2.0 m by rounding.
-    closure_angle
-        Largest relative heading, radians; pi: any.
-    min_index_gap
-        Least number of steps between the two poses, at least 2. Steps are counted along the indices that lead up to the start
-        and then along the new poses; old poses behind the start in the graph (of another robot, or tags) are any number away.
+    turn
+        Radians: a pose stands also where the robot has turned by this since the last one, several in one place at a sharp
+        corner, the start among them. None: by distance only.
+    closure_radius, closure_angle, min_index_gap
+        In place of `closures`, a rule by hand (`ClosureModel.by_hand`): all poses nearer than this (2 m), turned by at most
+        this (radians; pi: any) and at least so many steps apart (5), with certainty.
     world
         Where given, the poses must see each other in it, and the paths must stay in its free space.
     start
@@ -72,44 +76,87 @@ def predict_actions(
     list of Action
         In the order of the paths, labelled by their indices, "path 0" the first; `length` is the path's. Poses head along
         the path, at a corner as they came. First the odometry, old -> new, then the closures, new -> old, sorted. A path that
-        ends where it begins at once adds nothing.
+        ends where it begins at once adds nothing. A new pose first closes loops with poses of the graph; if that leaves some of
+        `closures.max_per_pose`, then with new poses before it.
 
     Raises
     ------
     InvalidInputError
-        Where a number is out of range, a path is not one, or there is no such pose to start at.
+        Where a number is out of range, a path is not one, there is no such pose to start at, or `closures` comes with a rule
+        by hand.
     PlanningError
         Where a path leaves the free space of the world, or no pose is in sight of the start. The straight way from a pose to a
         path that begins elsewhere counts too, unless the pose itself is not in free space.
     """
-    for name, value, upper in (
-        ("spacing", spacing, math.inf),
-        ("closure_radius", closure_radius, math.inf),
-        ("closure_angle", closure_angle, math.pi),
-    ):
-        if not (0 < value <= upper and math.isfinite(value)):
-            limit, hint = ("", "") if upper == math.inf else (f" and at most {upper:.6g}", degrees_hint(value))
-            raise InvalidInputError(f"expected {name} above 0{limit}, got {value}{hint}")
-    if min_index_gap < 2:
-        raise InvalidInputError(f"expected min_index_gap of at least 2 (1 is odometry), got {min_index_gap}")
+    if not (0 < spacing < math.inf):
+        raise InvalidInputError(f"expected spacing above 0, got {spacing}")
+    if turn is not None and not turn > 0:
+        raise InvalidInputError(f"expected turn above 0, or None for none, got {turn}")
+    by_hand = {"closure_radius": closure_radius, "closure_angle": closure_angle, "min_index_gap": min_index_gap}
+    model = _chosen_model(graph, closures, {name: value for name, value in by_hand.items() if value is not None}, world)
     omega = default_information(graph) if information is None else information
-    tree = KDTree(graph.positions)
     begin = find_start(graph, start, world=world)
-    actions: list[Action] = []
+    ways: list[_Way] = []
     for index, path in enumerate(paths):
         name = f"path {index}"
-        way = _way(graph, begin, checked_path(path, name=name), tolerance=_ROUNDING * spacing)
+        ways.append(_way(graph, begin, checked_path(path, name=name), tolerance=_ROUNDING * spacing))
         if world is not None:
-            _require_free(world, way, name)
-        poses = _poses_along(graph, begin, way, spacing)
-        new = graph.num_poses + np.arange(len(poses))
-        closures = _closures(
-            graph, begin, poses, tree, radius=closure_radius, angle=closure_angle, min_index_gap=min_index_gap, world=world
+            _require_free(world, ways[-1], name)
+    poses = [poses_along(graph, begin.pose, way.full, spacing=spacing, turn=turn) for way in ways]
+    found = _closures(graph, begin, poses, model, world)
+    actions: list[Action] = []
+    for index, (way, new_poses, closing) in enumerate(zip(ways, poses, found, strict=True)):
+        num_new = len(new_poses)
+        new = graph.num_poses + np.arange(num_new)
+        before = np.r_[begin.pose, new][:num_new]
+        edges = np.concatenate([np.stack([before, new], axis=1), closing])
+        chances = np.r_[np.ones(num_new), np.full(len(closing), model.probability)]
+        certain = model.probability == 1 or len(closing) == 0
+        actions.append(
+            Action(
+                new_poses,
+                edges,
+                omega if certain else chances[:, None, None] * np.asarray(omega, dtype=np.float64),
+                label=f"path {index}",
+                length=path_length(way.driven),
+                probabilities=None if certain else chances,
+            )
         )
-        before = np.r_[begin.pose, new][: len(new)]
-        edges = np.concatenate([np.stack([before, new], axis=1), closures])
-        actions.append(Action(poses, edges, omega, label=name, length=path_length(way.driven)))
     return actions
+
+
+def _chosen_model(
+    graph: PoseGraph, closures: ClosureModel | None, by_hand: dict[str, Any], world: World | None
+) -> ClosureModel:
+    if closures is None:
+        return ClosureModel.by_hand(**by_hand) if by_hand else learn_closures(graph, world=world)
+    if by_hand:
+        raise InvalidInputError(f"expected closures or a rule by hand, got both; leave out {' and '.join(by_hand)}")
+    return closures
+
+
+def _closures(
+    graph: PoseGraph, start: Start, paths: list[FloatArray], model: ClosureModel, world: World | None
+) -> list[IntArray]:
+    """Closures (new, old) of the new poses of each path: with poses of the graph first, then among themselves; sorted."""
+    n, sizes = graph.num_poses, [len(poses) for poses in paths]
+    if not paths:
+        return []
+    ends = np.cumsum(sizes)
+    steps = np.concatenate([np.arange(1, size + 1) for size in sizes])
+    every = np.concatenate(paths)
+    with_prior = closures_with_prior(graph, every, model, steps=steps, start=start.pose, world=world)
+    cuts = np.searchsorted(with_prior[:, 0], ends[:-1])
+    found: list[IntArray] = []
+    for poses, end, closing in zip(paths, ends.tolist(), np.split(with_prior, cuts), strict=True):
+        own = closing - np.array([end - len(poses), 0])
+        left = None
+        if model.max_per_pose is not None:
+            left = model.max_per_pose - np.bincount(own[:, 0], minlength=len(poses))
+        among = closures_among(graph.group, poses, model, left=left, world=world)
+        pairs = np.concatenate([own + np.array([n, 0]), among + n])
+        found.append(pairs[np.lexsort(pairs.T[::-1])])
+    return found
 
 
 def default_information(graph: PoseGraph) -> FloatArray:
@@ -169,57 +216,3 @@ def _require_free(world: World, way: _Way, name: str) -> None:
             f"expected {name} in the free space of the world, got one that leaves it between ({x:.2f}, {y:.2f}) and "
             f"({u:.2f}, {v:.2f}); change the path, or leave `world` out to predict without walls"
         )
-
-
-def _poses_along(graph: PoseGraph, start: Start, way: _Way, spacing: float) -> FloatArray:
-    """New poses, shape (L, pose_size), `spacing` apart along the way."""
-    path, length = way.full, path_length(way.full)
-    if length <= _ROUNDING * spacing:
-        return np.zeros((0, graph.group.pose_size))
-    steps = max(1, math.ceil(length / spacing - _ROUNDING))
-    x_y, heading = stations(path, np.minimum(spacing * np.arange(1, steps + 1), length))
-    x_y[-1] = path[-1]
-    if graph.group.pose_size == 3:
-        return np.column_stack([x_y, heading])
-    z, zero = np.full(steps, graph.positions[start.pose, 2]), np.zeros(steps)
-    return np.column_stack([x_y, z, zero, zero, np.sin(heading / 2), np.cos(heading / 2)])
-
-
-def _closures(
-    graph: PoseGraph,
-    start: Start,
-    poses: FloatArray,
-    tree: KDTree,
-    *,
-    radius: float,
-    angle: float,
-    min_index_gap: int,
-    world: World | None,
-) -> IntArray:
-    """Closures (new, old) of new poses with the graph's, whose positions are in the tree, and among themselves."""
-    group, n = graph.group, graph.num_poses
-    if len(poses) == 0:
-        return np.zeros((0, 2), dtype=np.int64)
-    new_tree = KDTree(group.position(poses))
-    with_prior = new_tree.sparse_distance_matrix(tree, radius, output_type="ndarray")
-    among_new = new_tree.query_pairs(radius, output_type="ndarray")
-    pairs = np.concatenate([np.stack([with_prior["i"] + n, with_prior["j"]], axis=1), among_new[:, ::-1] + n])
-    pairs = pairs[_steps_between(pairs, n, start.pose) >= min_index_gap]
-    new, old = pairs[np.lexsort(pairs.T[::-1])].T
-    every = np.concatenate([graph.poses, poses])
-    relative = group.between(every[new], every[old])
-    near = np.linalg.norm(group.position(relative), axis=1) < radius * (1 - _ROUNDING)
-    aligned = np.linalg.norm(group.rotation_vector(relative), axis=1) <= angle * (1 + _ROUNDING)
-    new, old = new[near & aligned], old[near & aligned]
-    if world is not None:
-        seen = world.visible(every[new, :2], every[old, :2])
-        new, old = new[seen], old[seen]
-    return np.stack([new, old], axis=1).astype(np.int64)
-
-
-def _steps_between(pairs: IntArray, num_old: int, start: int) -> FloatArray:
-    """Steps from each old pose along the graph to the start and on to the new pose; inf from poses behind the start."""
-    new, old = pairs[:, 0], pairs[:, 1]
-    is_old = old < num_old
-    steps = new - old - (num_old - 1 - start) * is_old  # as if the start were the last of the old poses
-    return np.where(is_old & (old > start), np.inf, steps)

@@ -7,16 +7,16 @@ report between the two.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from topobelief.arrays import FloatArray
+from topobelief.candidates.closures import ClosureModel
 from topobelief.candidates.diverse_paths import diverse_paths
 from topobelief.candidates.polyline import path_length
-from topobelief.candidates.predicted_factors import predict_actions
+from topobelief.candidates.predicted_factors import KEY_POSE_TURN, predict_actions
 from topobelief.candidates.roadmap import Roadmap, build_roadmap
 from topobelief.candidates.start import Start
 from topobelief.graph.action import Action
@@ -42,8 +42,10 @@ class CandidateRule:
         Of roadmap and paths.
     spacing
         Metres from new pose to new pose.
-    closure_radius, closure_angle, min_index_gap
-        Loops close between poses nearer than this (metres), turned by at most this (radians), and so many steps apart.
+    turn
+        Radians by which a path turns from new pose to new pose; None: by distance only.
+    closures
+        Which loops the new poses close; None: as learned from the graph.
     line_of_sight
         Whether loops close only between poses that see each other, and paths must stay in free space.
     information : shape (3, 3), or None
@@ -56,9 +58,8 @@ class CandidateRule:
     robot_radius: float = 0.35
     seed: int = 0
     spacing: float = 1.0
-    closure_radius: float = 2.0
-    closure_angle: float = math.pi
-    min_index_gap: int = 5
+    turn: float | None = KEY_POSE_TURN
+    closures: ClosureModel | None = None
     line_of_sight: bool = True
     information: FloatArray | None = None
 
@@ -151,9 +152,8 @@ def predict_candidates(
         routes.paths,
         information=rule.information,
         spacing=rule.spacing,
-        closure_radius=rule.closure_radius,
-        closure_angle=rule.closure_angle,
-        min_index_gap=rule.min_index_gap,
+        turn=rule.turn,
+        closures=rule.closures,
         world=world if rule.line_of_sight else None,
         start=start,
     )

@@ -20,6 +20,7 @@ from topobelief.planning.registry import AUTO, BOUNDS, OBJECTIVES, SIGNATURES
 Determinant = Literal["cholesky", "hadamard"]
 Proof = Literal["none", "bounded", "optimal"]
 Unknown = Literal["occupied", "free"]
+Closures = Literal["learned", "paper", "by-hand"]
 
 _WORLD = "Where the robot may drive"
 _CANDIDATES = "Candidate paths"
@@ -164,15 +165,25 @@ def plan(
     spacing: Annotated[
         float, typer.Option(metavar="M", help="Metres between new poses.", callback=_above_zero, rich_help_panel=_FACTORS)
     ] = 1.0,
+    closures: Annotated[
+        Closures | None,
+        typer.Option(
+            metavar="NAME",
+            help="Which loops close: learned from the graph, the rule of the paper, or by-hand, as the next three say.",
+            show_default="learned",
+            rich_help_panel=_FACTORS,
+        ),
+    ] = None,
     closure_radius: Annotated[
-        float,
+        float | None,
         typer.Option(
             metavar="M",
-            help="Loops close within this distance, metres.",
+            help="By hand: loops close with all poses within this distance, metres.",
+            show_default="2",
             callback=_above_zero,
             rich_help_panel=_FACTORS,
         ),
-    ] = 2.0,
+    ] = None,
     closure_angle: Annotated[
         float | None,
         typer.Option(
@@ -357,8 +368,10 @@ def plan(
 
     reporter = Reporter(as_json=as_json)
     with reporter.stage("start-up"):
+        from topobelief.candidates.predicted_factors import KEY_POSE_TURN
         from topobelief.candidates.propose import CandidateRule
         from topobelief.cli import plan_files, plan_stages
+        from topobelief.cli.closure_options import stated_closures, with_closures
         from topobelief.planning.planner import Planner
 
     folder = plan_files.checked_folder(out if out is not None or as_json else Path("out"))
@@ -370,9 +383,14 @@ def plan(
         robot_radius=robot_radius,
         seed=seed,
         spacing=spacing,
-        closure_radius=closure_radius,
-        closure_angle=closure_angle if closure_angle is not None else 1.0 if paper else math.pi,
-        min_index_gap=min_index_gap if min_index_gap is not None else 2 if paper else 5,
+        turn=None if paper else KEY_POSE_TURN,
+        closures=stated_closures(
+            closures,
+            paper=paper,
+            closure_radius=closure_radius,
+            closure_angle=closure_angle,
+            min_index_gap=min_index_gap,
+        ),
         line_of_sight=line_of_sight if line_of_sight is not None else not paper,
         information=plan_stages.information(sigma_p, sigma_theta),
     )
@@ -381,6 +399,7 @@ def plan(
     )
     graph = plan_stages.read_graph(graph_file, reporter, optimized=optimize, reading=reading)
     world = plan_stages.read_world(map_file, graph, reporter, width=width, unknown=unknown)
+    rule = with_closures(rule, graph, world, reporter)
     begin = plan_stages.choose_start(
         graph, world, reporter, pose_id=start.pose_id if start else None, place=start.place if start else None
     )

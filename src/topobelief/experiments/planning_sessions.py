@@ -17,6 +17,7 @@ from typing import Literal
 import numpy as np
 
 from topobelief.arrays import FloatArray
+from topobelief.candidates.closures import ClosureModel
 from topobelief.candidates.polyline import path_length
 from topobelief.candidates.propose import CandidateRule, Routes, find_routes, predict_candidates
 from topobelief.candidates.roadmap import Roadmap
@@ -36,7 +37,7 @@ NOISES = (0.1, 0.35, 0.85)
 """xi = sigma_theta / sigma_p, rad/m."""
 OBJECTIVES: tuple[str, ...] = ("joint", "map", "per_pose")
 
-_RULE = CandidateRule(max_detour=None, spacing=1.0, closure_radius=2.0, closure_angle=1.0, min_index_gap=2, line_of_sight=False)
+_RULE = CandidateRule(max_detour=None, spacing=1.0, turn=None, closures=ClosureModel.paper(), line_of_sight=False)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -37,6 +37,9 @@ class Action(ReadOnlyArrays):
         A deterministic cost (length, energy, time), in nats; it adds to the entropy and to its bounds.
     length
         How far the robot drives, metres; it is told and has no influence. Default: from pose to pose (`driven_lengths`).
+    probabilities : shape (c,), optional
+        That each measurement will be made, above 0 and at most 1. `information` is then the expected one: this times the
+        information of the measurement. Default: all are certain.
 
     Raises
     ------
@@ -50,6 +53,7 @@ class Action(ReadOnlyArrays):
     label: str
     cost: float
     length: float | None
+    probabilities: FloatArray | None
 
     def __init__(
         self,
@@ -60,6 +64,7 @@ class Action(ReadOnlyArrays):
         label: str = "",
         cost: float = 0.0,
         length: float | None = None,
+        probabilities: ArrayLike | None = None,
     ) -> None:
         try:
             raw_information = frozen_floats(information, name="information")
@@ -78,6 +83,7 @@ class Action(ReadOnlyArrays):
                 checked = np.zeros((0, 0, 0))
             else:
                 checked = checked_information(raw_information, num_edges=len(checked_edges), tangent_dim=group.tangent_dim)
+            chances = None if probabilities is None else _checked_probabilities(probabilities, len(checked_edges))
         except InvalidInputError as error:
             raise InvalidActionError(str(error), label=label) from None
         negative = np.flatnonzero((checked_edges < 0).any(axis=1))
@@ -94,6 +100,7 @@ class Action(ReadOnlyArrays):
             ("label", label),
             ("cost", float(cost)),
             ("length", None if length is None else float(length)),
+            ("probabilities", chances),
         ):
             object.__setattr__(self, name, value)
 
@@ -106,6 +113,15 @@ class Action(ReadOnlyArrays):
     def num_closures(self) -> int:
         """Edges beyond the one that each new pose needs to hang on the graph."""
         return len(self.edges) - self.num_new_poses
+
+
+def _checked_probabilities(probabilities: ArrayLike, num_edges: int) -> FloatArray:
+    chances = frozen_floats(probabilities, name="probabilities")
+    if chances.shape != (num_edges,):
+        raise InvalidInputError(f"expected a probability for each of the {num_edges} edges, got shape {chances.shape}")
+    if not ((chances > 0) & (chances <= 1)).all():
+        raise InvalidInputError("expected probabilities above 0 and at most 1, got others; leave out what cannot happen")
+    return chances
 
 
 def check_action(graph: PoseGraph, action: Action, *, index: int | None = None) -> None:

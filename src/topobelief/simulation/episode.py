@@ -219,8 +219,7 @@ class Episode:
             self._scenario.rule,
             seed=options.seed,
             spacing=settings.key_pose_distance,
-            closure_radius=settings.search_radius,
-            min_index_gap=settings.min_index_gap,
+            turn=settings.key_pose_angle,
             information=settings.expected_information if belief.num_edges == 0 else None,
         )
         found = known_candidates(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from topobelief.candidates.closures import ClosureModel
 from topobelief.errors import FileError
 from topobelief.experiments.study.specification import read_specification
 from topobelief.graph.pose_graph import PoseGraph
@@ -25,7 +26,16 @@ def test_all_that_is_said_is_read(specification_file):
     assert (found.strategies, found.objectives, found.seeds) == (("spanning_trees", "random"), ("joint",), (0, 1, 2))
     rule = found.rule.candidates
     assert (rule.max_detour, rule.line_of_sight, rule.num_vertices) == (None, False, 120)
-    assert rule.closure_radius == 2.0  # not said: as in `topobelief plan`
+    assert rule.closures == ClosureModel.paper()  # the radius, which is not said, is the paper's too
+    assert rule.turn is None
+
+
+def test_closures_may_be_learned_and_poses_stand_at_turns(specification_file):
+    text = specification_file.read_text().replace("closure_angle: 1.0, min_index_gap: 2", "closures: learned, turn: 0.3")
+    specification_file.write_text(text)
+    rule = read_specification(specification_file).rule
+    assert (rule.candidates.closures, rule.candidates.turn) == (None, 0.3)
+    assert rule.content["closures"] == "learned"
 
 
 def test_a_session_may_begin_with_a_recorded_graph(specification_file):
@@ -61,6 +71,8 @@ def test_a_session_may_begin_with_a_recorded_graph(specification_file):
         ("room: room.csv", "room: attic.csv", 1, "worlds.room: expected the path of a map"),
         ("max_detour: none", "max_detour: 0.9", 11, "rule.max_detour: expected a number of at least 1, got '0.9'"),
         ("closure_angle: 1.0", "closure_angle: 4", 11, "rule.closure_angle: expected a number above 0 and of at most 3.14159"),
+        ("rule: {", "rule: {closures: learned, ", 11, "rule.closures: expected 'by hand' where closure_angle"),
+        ("rule: {", "rule: {closures: lerned, ", 11, "rule.closures: expected one of learned, by hand, got 'lerned'"),
         ("line_of_sight: false", "line_of_sight: maybe", 11, "rule.line_of_sight: expected true or false, got 'maybe'"),
         ("rule: {", "rule: {radius: 2, ", 11, "rule.radius: expected 'robot_radius', got the unknown key 'radius'"),
         ("rule: {", "rule: {{", 12, "expected YAML, got other text (while parsing a flow mapping expected "),

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, TypeVar, cast, get_args
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from topobelief.arrays import FloatArray
 from topobelief.bounds.entropy_bounds import Determinant
+from topobelief.candidates.closures import ClosureModel
 from topobelief.candidates.propose import CandidateRule
 from topobelief.errors import FileError
 from topobelief.estimation import optimize
@@ -32,7 +33,14 @@ from topobelief.world import World
 _Entry = TypeVar("_Entry")
 _NO_LIMIT = ("none", "inf", ".inf")
 _VARIED = ("num_paths", "seed", "information")  # by session, seed and noise
-_CANDIDATE_KEYS = tuple(field.name for field in fields(CandidateRule) if field.name not in _VARIED)
+_CANDIDATE_KEYS = tuple(field.name for field in fields(CandidateRule) if field.name not in (*_VARIED, "closures"))
+_LEARNED, _BY_HAND = "learned", "by hand"
+_CLOSURE_KEYS = ("closure_radius", "closure_angle", "min_index_gap")  # of a rule by hand
+
+
+def _default_candidates() -> CandidateRule:
+    """As in `topobelief plan`, but with closures by a rule and poses by distance, as in the paper."""
+    return CandidateRule(turn=None, closures=ClosureModel.by_hand())
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +63,7 @@ class Noise:
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """How candidates are found, their factors predicted and their entropies bounded; as `topobelief plan` has them.
+    """How candidates are found, their factors predicted and their entropies bounded.
 
     Attributes
     ----------
@@ -65,7 +73,7 @@ class Rule:
         As the planner takes them.
     """
 
-    candidates: CandidateRule = field(default_factory=CandidateRule)
+    candidates: CandidateRule = field(default_factory=_default_candidates)
     bounds: str = "fischer"
     determinant: Determinant = "cholesky"
 
@@ -74,8 +82,14 @@ class Rule:
         """All of it by the keys of the YAML file; inf where detours have no limit."""
         rule = self.candidates
         detour = math.inf if rule.max_detour is None else rule.max_detour
-        values = {key: getattr(rule, key) for key in _CANDIDATE_KEYS}
-        return {**values, "max_detour": detour, "bounds": self.bounds, "determinant": self.determinant}
+        values: dict[str, object] = {key: getattr(rule, key) for key in _CANDIDATE_KEYS}
+        if rule.turn is None:
+            del values["turn"]
+        values |= {"max_detour": detour, "bounds": self.bounds, "determinant": self.determinant}
+        if rule.closures is None:
+            return {**values, "closures": _LEARNED}
+        by_hand = (rule.closures.radius, rule.closures.angle, rule.closures.min_index_gap)
+        return {**values, **dict(zip(_CLOSURE_KEYS, by_hand, strict=True))}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -239,6 +253,8 @@ def _rule(field: Field) -> Rule:
         "robot_radius": lambda item: item.number(above=0),
         "max_detour": _detour,
         "spacing": lambda item: item.number(above=0),
+        "turn": _turn,
+        "closures": lambda item: item.choice((_LEARNED, _BY_HAND)),
         "closure_radius": lambda item: item.number(above=0),
         "closure_angle": lambda item: item.number(above=0, at_most=math.pi),
         "min_index_gap": lambda item: item.whole(at_least=2),
@@ -246,10 +262,22 @@ def _rule(field: Field) -> Rule:
         "bounds": lambda item: item.choice((*BOUNDS, AUTO)),
         "determinant": lambda item: item.choice(get_args(Determinant)),
     }
-    values = {key: readers[key](child) for key, child in field.mapping(optional=readers).items()}
+    keys = field.mapping(optional=readers)
+    values = {key: readers[key](child) for key, child in keys.items()}
+    learned = values.pop("closures", _BY_HAND) == _LEARNED
+    by_hand: dict[str, Any] = {key: values.pop(key) for key in _CLOSURE_KEYS if key in values}
+    if learned and by_hand:
+        keys["closures"].refuse(f"{_BY_HAND!r} where {' and '.join(by_hand)} is given", repr(_LEARNED))
     of_candidates: dict[str, Any] = {key: value for key, value in values.items() if key in _CANDIDATE_KEYS}
     others: dict[str, Any] = {key: value for key, value in values.items() if key not in _CANDIDATE_KEYS}
-    return Rule(CandidateRule(**of_candidates), **others)
+    closures = None if learned else ClosureModel.by_hand(**by_hand)
+    return Rule(replace(_default_candidates(), closures=closures, **of_candidates), **others)
+
+
+def _turn(field: Field) -> float | None:
+    if field.text(expected="a number above 0, or none for poses by distance only").lower() in _NO_LIMIT:
+        return None
+    return field.number(above=0)
 
 
 def _detour(field: Field) -> float | None:
