@@ -1,1 +1,1 @@
-"""The best walk of a whole roadmap: a local search for the value, bounds for the certificate, and the two together."""
+"""The best walk of a whole roadmap, and how much better any other could be."""
