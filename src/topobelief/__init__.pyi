@@ -34,6 +34,8 @@ from .planning.decision import Decision as Decision
 from .planning.decision_quality import DecisionQuality as DecisionQuality
 from .planning.decision_quality import decision_quality as decision_quality
 from .planning.planner import Planner as Planner
+from .search.result import SearchResult as SearchResult
+from .search.roadmap_search import search_roadmap as search_roadmap
 from .signatures.spanning_trees import log_num_spanning_trees as log_num_spanning_trees
 from .signatures.spanning_trees import spanning_tree_signature as spanning_tree_signature
 from .signatures.von_neumann import von_neumann_entropy as von_neumann_entropy

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
 from topobelief.arrays import FloatArray
+from topobelief.candidates.distinct_paths import DistinctPaths
 from topobelief.candidates.polyline import path_length
 from topobelief.graph.action import Action
 from topobelief.planning.planner import Planner
@@ -14,6 +15,9 @@ from topobelief.search.walks import Walk
 
 Predict = Callable[[list[FloatArray]], list[Action]]
 """From paths, each of shape (waypoints, 2), to what driving each adds to the graph."""
+
+SAME_VALUE = 1e-9  # relative: values that differ by less are equal
+_NUM_LANDMARKS = 16
 
 
 class Evaluations:
@@ -35,6 +39,7 @@ class Evaluations:
         self.cost_per_metre = cost_per_metre
         self.objectives: dict[Walk, float] = {}  # in the order of their evaluation, cost excluded
         self.lengths: dict[Walk, float] = {}  # metres
+        self.sees_map = False  # whether a loop is closed on any walk so far
 
     def __len__(self) -> int:
         return len(self.objectives)
@@ -53,18 +58,46 @@ class Evaluations:
         if not new:
             return
         paths = [self.path(walk) for walk in new]
-        values = self._planner.entropies(self._predict(paths)).tolist()
+        actions = self._predict(paths)
+        values = self._planner.entropies(actions).tolist()
+        self.sees_map |= any(action.num_closures for action in actions)
         for walk, path, value in zip(new, paths, values, strict=True):
             self.lengths[walk] = path_length(path)
             self.objectives[walk] = value
 
-    def action(self, walk: Walk, label: str) -> Action:
-        """What driving a walk adds to the graph, its cost that of its length."""
+    def action(self, walk: Walk) -> Action:
+        """What driving a walk adds to the graph; its cost is that of its length."""
         (action,) = self._predict([self.path(walk)])
-        cost = self.cost_per_metre * path_length(self.path(walk))
-        return Action(action.poses, action.edges, action.information, label=label, cost=cost, length=action.length)
+        return Action(
+            action.poses,
+            action.edges,
+            action.information,
+            cost=self.cost_per_metre * path_length(self.path(walk)),
+            length=action.length,
+            probabilities=action.probabilities,
+        )
 
     def arrays(self) -> tuple[list[Walk], FloatArray, FloatArray]:
-        """All walks evaluated so far, their lengths (metres) and objectives, in the order of their evaluation."""
-        walks = list(self.objectives)
-        return walks, np.array([self.lengths[walk] for walk in walks]), np.array(list(self.objectives.values()))
+        """All walks evaluated so far, their lengths (metres) and values, in the order of their evaluation."""
+        walks, lengths = list(self.objectives), np.array([*self.lengths.values()])[: len(self.objectives)]
+        return walks, lengths, np.array([*self.objectives.values()]) + self.cost_per_metre * lengths
+
+    def best(self) -> Walk:
+        """The walk of least value; the shortest one of those whose values differ by rounding only."""
+        walks, lengths, values = self.arrays()
+        least = values.min()
+        equal = np.flatnonzero(values <= least + SAME_VALUE * max(1e-3, abs(least)))
+        return walks[equal[np.lexsort((values[equal], lengths[equal]))[0]]]
+
+    def different(self, order: Iterable[int], count: int, apart: float) -> list[Walk]:
+        """The first `count` walks of an order that are more than a distance from each other (Fréchet, metres)."""
+        walks, kept = list(self.objectives), list[Walk]()
+        distinct = DistinctPaths(self._vertices[np.linspace(0, len(self._vertices) - 1, _NUM_LANDMARKS).astype(int)])
+        for index in order:
+            path = self.path(walks[index])
+            if not distinct.any_within(path, apart):
+                distinct.add(path)
+                kept.append(walks[index])
+                if len(kept) == count:
+                    break
+        return kept

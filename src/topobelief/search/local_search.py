@@ -23,9 +23,8 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from topobelief.arrays import FloatArray, IntArray
-from topobelief.candidates.distinct_paths import DistinctPaths
 from topobelief.search.evaluations import Evaluations
-from topobelief.search.front import on_front
+from topobelief.search.front import on_front, spread_on_front
 from topobelief.search.walks import Walk, Walks
 
 Vias = tuple[int, ...]
@@ -34,7 +33,7 @@ _NUM_LEADERS = 6
 _NUM_SHORTER = 6  # leaders at shorter lengths
 _DIFFERENT = 0.05  # share of the length limit by which leaders differ (Fréchet)
 _NUM_NEAR = 8  # vertices near a via-vertex that may replace it
-_NUM_LANDMARKS = 16
+_MOST_COMPARED = 250  # walks among which leaders are looked for
 
 
 class LocalSearch:
@@ -55,7 +54,6 @@ class LocalSearch:
         self._candidates = candidates[walks.in_reach[candidates]]
         reachable = np.flatnonzero(walks.in_reach)
         self._reachable, self._near = reachable, KDTree(walks.roadmap.vertices[reachable])
-        self._landmarks = walks.roadmap.vertices[reachable[np.linspace(0, len(reachable) - 1, _NUM_LANDMARKS).astype(int)]]
         self._yield: dict[int, float] = {}  # most that inserting a via-vertex gained, per metre
         self._left: dict[Walk, Iterator[list[_Change]]] = {}
         self._exhausted: set[Walk] = set()
@@ -129,24 +127,12 @@ class LocalSearch:
 
     def _leaders(self) -> list[Walk]:
         """The best walks that differ from each other, then some of the best at shorter lengths."""
-        walks, lengths, objectives = self._evaluations.arrays()
-        values = objectives + self._evaluations.cost_per_metre * lengths
-        leaders = self._different(walks, np.argsort(values, kind="stable"), _NUM_LEADERS)
+        walks, lengths, values = self._evaluations.arrays()
+        best_first = np.argsort(values, kind="stable")[: _MOST_COMPARED].tolist()
+        leaders = self._evaluations.different(best_first, _NUM_LEADERS, _DIFFERENT * self._walks.max_length)
         shorter = on_front(lengths, values)
-        spread = np.unique(np.linspace(0, len(shorter) - 1, min(len(shorter), _NUM_SHORTER)).astype(int))
-        return list(dict.fromkeys([*leaders, *(walks[index] for index in shorter[spread])]))
-
-    def _different(self, walks: list[Walk], order: IntArray, count: int) -> list[Walk]:
-        """The first walks of an order that differ from those before."""
-        kept, distinct = [], DistinctPaths(self._landmarks)
-        for index in order[: 40 * count].tolist():
-            path = self._evaluations.path(walks[index])
-            if not distinct.any_within(path, _DIFFERENT * self._walks.max_length):
-                distinct.add(path)
-                kept.append(walks[index])
-                if len(kept) == count:
-                    break
-        return kept
+        spread = shorter[spread_on_front(lengths[shorter], _NUM_SHORTER)]
+        return list(dict.fromkeys([*leaders, *(walks[index] for index in spread.tolist())]))
 
     def _batches(self, walk: Walk, size: int) -> Iterator[list[_Change]]:
         """Neighbours of a walk, most promising first."""
