@@ -219,9 +219,14 @@ class Region:
         _shapely.prepare((self._shape, self._boundary))
 
     @cached_property
-    def _segments(self) -> Any:
+    def _pieces(self) -> tuple[FloatArray, FloatArray]:
+        """Starts and ends of the boundary's segments, shape (M, 2)."""
         corners, first, _ = _boundary_segments(self._shape)
-        return cast("Any", shapely.STRtree)(segments(corners[first], corners[first + 1]))
+        return corners[first], corners[first + 1]
+
+    @cached_property
+    def _segments(self) -> Any:
+        return cast("Any", shapely.STRtree)(segments(*self._pieces))
 
     def contains(self, points: FloatArray) -> BoolArray:
         """Whether each point, shape (N, 2), lies inside and not on the boundary."""
@@ -230,6 +235,12 @@ class Region:
     def boundary_distances(self, points: FloatArray) -> FloatArray:
         """Distance of each point, shape (N, 2), to the boundary."""
         return self._segments.query_nearest(_shapely.points(points), return_distance=True, all_matches=False)[1]
+
+    def boundary_in_boxes(self, lower: FloatArray, upper: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
+        """Boundary segments whose extent overlaps each box: index of the box, shape (M,), starts and ends, shape (M, 2)."""
+        box, piece = self._segments.query(_shapely.box(lower[:, 0], lower[:, 1], upper[:, 0], upper[:, 1]))
+        starts, ends = self._pieces
+        return box, starts[piece], ends[piece]
 
     def boundary_near(self, starts: FloatArray, ends: FloatArray, distance: float) -> BoolArray:
         """Whether each segment, shapes (N, 2), comes within a distance of the boundary, or exactly to it."""

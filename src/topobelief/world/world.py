@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from shapely import MultiPolygon, Polygon, box
 
-from topobelief.arrays import BoolArray, FloatArray, frozen_floats
+from topobelief.arrays import BoolArray, FloatArray, IntArray, frozen_floats
 from topobelief.errors import InvalidInputError, InvalidMapError
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.world import shapes
@@ -197,6 +197,21 @@ class World:
     def visible(self, starts: ArrayLike, ends: ArrayLike) -> BoolArray:
         """Whether nothing stands on the line of sight from each start to its end, shape (N,)."""
         return self.segments_free(starts, ends, 0.0)
+
+    def walls_in_boxes(self, lower: FloatArray, upper: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
+        """Straight pieces of the boundary whose extent overlaps each of some boxes.
+
+        Parameters
+        ----------
+        lower, upper : shape (N, 2)
+            Opposite corners.
+
+        Returns
+        -------
+        box : shape (M,); starts, ends : shape (M, 2)
+            One row for each pair of a box and a piece.
+        """
+        return self._region.boundary_in_boxes(lower, upper)
 
     def component(self, point: ArrayLike, radius: float) -> Polygon:
         """All places that the centre of a disc can be moved to from a point, slightly too large.

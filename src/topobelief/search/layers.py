@@ -1,0 +1,339 @@
+"""The walks of a roadmap as paths through layers of length delta, and longest paths through them.
+
+A walk that has come s metres (from the pose that the robot was at) when it reaches vertex v is at the state (v, k) with
+k delta <= s < (k + 1) delta. A way of length l leads from there to the layer of s + l, one of two: which one depends on where
+in its layer s lies, of which a state knows an interval. So every walk is a path through the layers, and some paths through them
+are no walks: they take the lower layer too often, which saves up to delta a way. What a path is told of the length that it truly
+has (`Arcs.way`) lets whoever weighs arcs charge for it.
+
+spacing = m delta. A way from layer k to layer k' drops the new poses t with k < t m <= k', the t-th on the piece t m - k of the
+way (`ways`), whatever s is. The last pose stands at the walk's end.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from topobelief.arrays import BoolArray, FloatArray, IntArray
+from topobelief.linalg.compiled import compiled
+from topobelief.search.ways import Ways
+
+_TIE = 1e-9  # of a layer: lengths that differ by less are equal
+
+
+@dataclass(frozen=True, slots=True)
+class Records:
+    """New poses that arcs drop: number t = 1, 2, …, and the way and its piece (counted from 0) on which the pose stands."""
+
+    number: IntArray
+    way: IntArray
+    piece: IntArray
+
+
+@dataclass(frozen=True, slots=True)
+class Arcs:
+    """Arcs between states k V + v, those of lower layers first.
+
+    Attributes
+    ----------
+    source, target : shape (A,)
+        States; the target of an arc that ends a walk is -1.
+    way : shape (A,)
+        Which way is driven; -1 for the walk that stays where it is.
+    record, count : shape (A,)
+        The poses dropped are count records from `record` on.
+    end : shape (A,)
+        Record of a pose at the end of the walk, -1 for none.
+    last : shape (A,)
+        Number of the walk's last pose where the arc ends it, else -1.
+    """
+
+    source: IntArray
+    target: IntArray
+    way: IntArray
+    record: IntArray
+    count: IntArray
+    end: IntArray
+    last: IntArray
+
+
+@dataclass(frozen=True, slots=True)
+class Layers:
+    """All arcs that some walk within the length may take.
+
+    Attributes
+    ----------
+    num_vertices, num_layers
+    pieces_per_pose
+        m.
+    first_state
+        Where walks begin.
+    """
+
+    num_vertices: int
+    num_layers: int
+    pieces_per_pose: int
+    first_state: int
+    arcs: Arcs
+    records: Records
+
+
+def build_layers(
+    ways: Ways, first_vertex: int, to_go: FloatArray, is_end: BoolArray, max_length: float, delta: float, pieces_per_pose: int
+) -> Layers:
+    """The layers of the walks from a vertex.
+
+    Parameters
+    ----------
+    ways
+        Between vertices 0 … V - 1.
+    first_vertex
+    to_go : shape (V,)
+        Length of the shortest way to an end from each vertex, metres; inf where there is none.
+    is_end : shape (V,)
+        Where walks may end.
+    max_length
+        Metres, counted from the first vertex.
+    delta, pieces_per_pose
+    """
+    num_vertices = len(to_go)
+    num_layers = int(np.floor(max_length / delta + 1e-6)) + 1
+    order = np.argsort(ways.source, kind="stable")
+    out = np.searchsorted(ways.source[order], np.arange(num_vertices + 1))
+    reach = (out, order, ways.target, ways.lengths, to_go)
+    nearest, furthest = _reached(*reach, first_vertex, num_layers, delta, max_length)
+    sizes = _arcs(*reach, is_end, nearest, furthest, delta, max_length, pieces_per_pose, first_vertex, False, *_room(0, 0))
+    arcs, records = _room(sizes[0], sizes[1])
+    _arcs(*reach, is_end, nearest, furthest, delta, max_length, pieces_per_pose, first_vertex, True, arcs, records)
+    return Layers(num_vertices, num_layers, pieces_per_pose, first_vertex, Arcs(*arcs), Records(*records))
+
+
+def _room(num_arcs: int, num_records: int) -> tuple[IntArray, IntArray]:
+    return np.empty((7, num_arcs), np.int64), np.empty((3, num_records), np.int64)
+
+
+@compiled
+def _reached(
+    out: IntArray,
+    order: IntArray,
+    target: IntArray,
+    lengths: FloatArray,
+    to_go: FloatArray,
+    first_vertex: int,
+    num_layers: int,
+    delta: float,
+    max_length: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Least and largest length at which walks reach each state, shape (layers, V); inf and -inf for none."""
+    nearest, furthest = np.empty((num_layers, len(to_go))), np.empty((num_layers, len(to_go)))
+    for k in range(num_layers):
+        for v in range(len(to_go)):
+            nearest[k, v], furthest[k, v] = np.inf, -np.inf
+    nearest[0, first_vertex] = furthest[0, first_vertex] = 0.0
+    for k in range(num_layers):
+        again = True
+        while again:
+            again = False
+            for v in range(len(to_go)):
+                if nearest[k, v] == np.inf:
+                    continue
+                for r in range(out[v], out[v + 1]):
+                    e = order[r]
+                    w, low, high = target[e], nearest[k, v] + lengths[e], furthest[k, v] + lengths[e]
+                    for q in range(int(low / delta + 1e-9), int(high / delta + 1e-9) + 1):
+                        at = max(low, q * delta)
+                        if q >= num_layers or not at + to_go[w] <= max_length * (1.0 + 1e-12) + 1e-9:
+                            break
+                        if at < nearest[q, w]:
+                            again = again or (q == k and at < nearest[q, w] - 1e-12)
+                            nearest[q, w] = at
+                        upto = (q + 1 - 1e-8) * delta
+                        upto = upto if q == k else min(high, upto)
+                        if upto > furthest[q, w]:
+                            again = again or q == k
+                            furthest[q, w] = upto
+    return nearest, furthest
+
+
+@compiled
+def _arcs(
+    out: IntArray,
+    order: IntArray,
+    target: IntArray,
+    lengths: FloatArray,
+    to_go: FloatArray,
+    is_end: BoolArray,
+    nearest: FloatArray,
+    furthest: FloatArray,
+    delta: float,
+    max_length: float,
+    m: int,
+    first_vertex: int,
+    fill: bool,
+    arcs: IntArray,
+    records: IntArray,
+) -> tuple[int, int]:
+    """Count the arcs and records, and put them into the tables if asked to."""
+    num_layers, num_vertices = nearest.shape
+    a = r = 0
+    if is_end[first_vertex]:
+        if fill:
+            arcs[0, a], arcs[1, a], arcs[2, a], arcs[3, a], arcs[4, a], arcs[5, a], arcs[6, a] = first_vertex, -1, -1, 0, 0, -1, 0
+        a += 1
+    for k in range(num_layers):
+        for v in range(num_vertices):
+            if nearest[k, v] == np.inf:
+                continue
+            for o in range(out[v], out[v + 1]):
+                e = order[o]
+                w, low, high = target[e], nearest[k, v] + lengths[e], furthest[k, v] + lengths[e]
+                record, lowest = r, int(low / delta + 1e-9)
+                highest = min(int(high / delta + 1e-9), num_layers - 1)
+                while highest >= lowest and not max(low, highest * delta) + to_go[w] <= max_length * (1.0 + 1e-12) + 1e-9:
+                    highest -= 1
+                if highest < lowest:
+                    continue
+                for t in range(k // m + 1, highest // m + 1):
+                    if fill:
+                        records[0, r], records[1, r], records[2, r] = t, e, t * m - k - 1
+                    r += 1
+                for q in range(lowest, highest + 1):
+                    count = q // m - k // m
+                    if fill:
+                        arcs[0, a], arcs[1, a], arcs[2, a] = k * num_vertices + v, q * num_vertices + w, e
+                        arcs[3, a], arcs[4, a], arcs[5, a], arcs[6, a] = record, count, -1, -1
+                    a += 1
+                    if not is_end[w] or not max(low, q * delta) <= max_length * (1.0 + 1e-12) + 1e-9:
+                        continue
+                    tie = q * delta + 1e-9 * m * delta
+                    if q % m == 0 and low <= tie:  # the walk ends where its last pose was dropped
+                        if fill:
+                            arcs[0, a], arcs[1, a], arcs[2, a] = k * num_vertices + v, -1, e
+                            arcs[3, a], arcs[4, a], arcs[5, a], arcs[6, a] = record, count, -1, q // m
+                        a += 1
+                    if q % m == 0 and high <= tie:
+                        continue
+                    if fill:
+                        records[0, r], records[1, r] = q // m + 1, e
+                        records[2, r] = int(np.ceil(lengths[e] / delta - 1e-9))
+                        arcs[0, a], arcs[1, a], arcs[2, a] = k * num_vertices + v, -1, e
+                        arcs[3, a], arcs[4, a], arcs[5, a], arcs[6, a] = record, count, r, q // m + 1
+                    r += 1
+                    a += 1
+    return a, r
+
+
+@dataclass(frozen=True, slots=True)
+class Longest:
+    """The longest path through some arcs.
+
+    Attributes
+    ----------
+    value
+        Its length; -inf where no path ends.
+    arcs : shape (L,)
+        Which arcs it takes, in order.
+    ahead : shape (states,)
+        Length of the longest path to each state.
+    """
+
+    value: float
+    arcs: IntArray
+    ahead: FloatArray
+
+
+def longest_path(layers: Layers, which: IntArray, weights: FloatArray) -> Longest:
+    """Dynamic programming forwards.
+
+    Parameters
+    ----------
+    layers
+    which : shape (A,)
+        Arcs that may be used, ascending.
+    weights : shape (A,)
+        Of arcs within one layer at most 0.
+    """
+    arcs, num_vertices = layers.arcs, layers.num_vertices
+    source, target = arcs.source[which], arcs.target[which]
+    ahead, before, value, last = _forward(
+        source, target, weights, _layer_bounds(layers, source), num_vertices, num_vertices * layers.num_layers, layers.first_state
+    )
+    path: list[int] = []
+    while last >= 0:
+        path.append(int(which[last]))
+        last = int(before[source[last]])
+    return Longest(float(value), np.array(path[::-1], dtype=np.int64), ahead)
+
+
+def longest_to_end(layers: Layers, which: IntArray, weights: FloatArray) -> FloatArray:
+    """Length of the longest path from each state to an end, -inf where there is none; shape (states,)."""
+    source, target = layers.arcs.source[which], layers.arcs.target[which]
+    num_vertices = layers.num_vertices
+    bounds = _layer_bounds(layers, source)
+    return _backward(source, target, weights, bounds, num_vertices, num_vertices * layers.num_layers)
+
+
+def _layer_bounds(layers: Layers, source: IntArray) -> IntArray:
+    return np.searchsorted(source, layers.num_vertices * np.arange(layers.num_layers + 1))
+
+
+@compiled
+def _forward(
+    source: IntArray,
+    target: IntArray,
+    weights: FloatArray,
+    bounds: IntArray,
+    num_vertices: int,
+    num_states: int,
+    first_state: int,
+) -> tuple[FloatArray, IntArray, float, int]:
+    best, before = np.empty(num_states), np.empty(num_states, np.int64)
+    for s in range(num_states):
+        best[s], before[s] = -np.inf, -1
+    best[first_state] = 0.0
+    value, last = -np.inf, -1
+    for k in range(len(bounds) - 1):
+        top = (k + 1) * num_vertices
+        again = True
+        while again:  # arcs within the layer
+            again = False
+            for a in range(bounds[k], bounds[k + 1]):
+                to = target[a]
+                if 0 <= to < top and best[source[a]] + weights[a] > best[to]:
+                    best[to], before[to] = best[source[a]] + weights[a], a
+                    again = True
+        for a in range(bounds[k], bounds[k + 1]):
+            to, length = target[a], best[source[a]] + weights[a]
+            if to < 0:
+                if length > value:
+                    value, last = length, a
+            elif to >= top and length > best[to]:
+                best[to], before[to] = length, a
+    return best, before, value, last
+
+
+@compiled
+def _backward(
+    source: IntArray, target: IntArray, weights: FloatArray, bounds: IntArray, num_vertices: int, num_states: int
+) -> FloatArray:
+    best = np.empty(num_states)
+    for s in range(num_states):
+        best[s] = -np.inf
+    for k in range(len(bounds) - 2, -1, -1):
+        top = (k + 1) * num_vertices
+        for a in range(bounds[k], bounds[k + 1]):
+            to = target[a]
+            if to < 0 or to >= top:
+                length = weights[a] + (0.0 if to < 0 else best[to])
+                best[source[a]] = max(best[source[a]], length)
+        again = True
+        while again:
+            again = False
+            for a in range(bounds[k], bounds[k + 1]):
+                to = target[a]
+                if 0 <= to < top and best[to] + weights[a] > best[source[a]]:
+                    best[source[a]] = best[to] + weights[a]
+                    again = True
+    return best

@@ -1,0 +1,272 @@
+"""What the arcs of the layers are worth to a gain's slopes, and the plan that a path through them is.
+
+A new pose anywhere on a piece of a way is covered in two steps. It closes loops with poses that its piece sees: with all of them
+or, where at most k are allowed, with k of them; slopes are never negative, so the k largest are an upper bound. Its odometry
+
+    V(u) = (A_0 + u N A_0)^T Omega (A_0 + u N A_0),   A_0 = Ad(x)^-1 at the beginning of the way, N = Ad(exp(-e_x)) - I,
+
+u metres further along the way, is a convex function of u: it lies below the chord between the ends of the piece. So a mixture of
+two plans, one with each end's odometry, has no less information than the walk, and one of the two is worth as much.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from topobelief.arrays import BoolArray, FloatArray, IntArray
+from topobelief.geometry import Group
+from topobelief.linalg.compiled import compiled
+from topobelief.search.information_gain import Slopes
+from topobelief.search.layers import Arcs, Layers, Records
+from topobelief.search.plans import Plan
+from topobelief.search.reduced_prior import world_to_body
+from topobelief.search.ways import Sightings, Ways
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """A path through the layers and the plan that it is.
+
+    Attributes
+    ----------
+    arcs, records : shape (L,), (T',)
+        Its arcs; the poses that it drops.
+    plan
+    """
+
+    arcs: IntArray
+    records: IntArray
+    plan: Plan
+
+
+@dataclass(frozen=True, slots=True)
+class Rewards:
+    """What is needed to value arcs.
+
+    Attributes
+    ----------
+    layers, ways, sightings
+    delta
+        Length of a piece, metres.
+    powers : shape (3, E, kappa, kappa)
+        Coefficients of V(u) along each way.
+    idle : shape (kappa, kappa)
+        Odometry of idle poses.
+    earliest : shape (m,)
+        The first new pose that may close a loop with each seen pose.
+    most
+        Closures of a new pose at most; 0: no limit.
+    num_new
+        T.
+    driven : shape (E,)
+        Metres that count as length, along each way.
+    prices : shape (E,)
+        What driving each way costs, in the unit of the objective.
+    """
+
+    layers: Layers
+    ways: Ways
+    sightings: Sightings
+    delta: float
+    powers: FloatArray
+    idle: FloatArray
+    earliest: IntArray
+    most: int
+    num_new: int
+    driven: FloatArray
+    prices: FloatArray
+
+    def of_records(self, slopes: Slopes, used: IntArray) -> FloatArray:
+        """Worth of some records, in a table of all of them."""
+        worth = np.empty(len(self.layers.records.number))
+        on_ways = np.einsum("tab,ceab->cte", slopes.odometry, self.powers)
+        sightings, records = self.sightings, self.layers.records
+        _value_records(
+            used, records.number, records.way, records.piece, self.ways.lengths, self.delta, on_ways, slopes.closures,
+            sightings.first, sightings.start, sightings.poses, self.earliest, self.most, worth,
+        )  # fmt: skip
+        return worth
+
+    def of_arcs(self, worth: FloatArray, which: IntArray, slopes: Slopes, price: float, toll: float, at_end: FloatArray) -> FloatArray:
+        """Weights of some arcs.
+
+        Parameters
+        ----------
+        worth
+            Of the records.
+        which
+        slopes
+        price
+            Worth of one unit of cost.
+        toll
+            Worth of one metre, beyond its cost.
+        at_end : shape (T + 1,)
+            What ends a walk after each number of poses.
+        """
+        idle = np.einsum("tab,ab->t", slopes.odometry, self.idle)
+        remaining = np.concatenate([np.cumsum(idle[::-1])[::-1], np.zeros(1)])
+        arcs, charge = self.layers.arcs, price * self.prices + toll * self.driven
+        return _value_arcs(which, arcs.way, arcs.record, arcs.count, arcs.end, arcs.last, worth, charge, remaining + at_end)
+
+    def course(self, path: IntArray, slopes: Slopes) -> Course:
+        """The plan of a path, with the closures and odometry that the slopes prefer."""
+        layers, arcs = self.layers, self.layers.arcs
+        taken: list[int] = []
+        for arc in path.tolist():
+            taken.extend(range(int(arcs.record[arc]), int(arcs.record[arc] + arcs.count[arc])))
+            if arcs.end[arc] >= 0:
+                taken.append(int(arcs.end[arc]))
+        records = np.array(taken, dtype=np.int64)
+        closures = np.zeros(slopes.closures.shape)
+        odometry = np.broadcast_to(self.idle, slopes.odometry.shape).copy()
+        sightings = self.sightings
+        for record in taken:
+            t, e, piece = (int(column[record]) for column in (layers.records.number, layers.records.way, layers.records.piece))
+            place = int(sightings.first[e]) + piece
+            seen = sightings.poses[sightings.start[place] : sightings.start[place + 1]]
+            seen = seen[self.earliest[seen] <= t]
+            if self.most and len(seen) > self.most:
+                seen = seen[np.argsort(-slopes.closures[t - 1, seen], kind="stable")[: self.most]]
+            closures[t - 1, seen] = 1.0
+            ends = self._odometry_at(e, piece)
+            odometry[t - 1] = max(ends, key=lambda end: float(np.vdot(slopes.odometry[t - 1], end)))
+        ways = arcs.way[path]
+        ways = ways[ways >= 0]
+        plan = Plan(closures, odometry, float(arcs.last[path[-1]]), float(self.driven[ways].sum()), float(self.prices[ways].sum()))
+        return Course(path, records, plan)
+
+    def _odometry_at(self, way: int, piece: int) -> list[FloatArray]:
+        length = float(self.ways.lengths[way])
+        is_end = piece == self.sightings.first[way + 1] - self.sightings.first[way] - 1
+        places = [length] if is_end else [piece * self.delta, min((piece + 1) * self.delta, length)]
+        return [self.powers[0, way] + u * self.powers[1, way] + u * u * self.powers[2, way] for u in places]
+
+    def places(self) -> tuple[FloatArray, FloatArray]:
+        """Where the pieces of all records begin and end, metres, shape (R, 2) each."""
+        records, ways = self.layers.records, self.ways
+        length = ways.lengths[records.way]
+        along = (ways.end - ways.begin)[records.way] / length[:, None]
+        begin = np.minimum(records.piece * self.delta, length)
+        end = np.minimum(begin + self.delta, length)
+        origin = ways.begin[records.way]
+        return origin + begin[:, None] * along, origin + end[:, None] * along
+
+
+def odometry_powers(group: Group, poses: FloatArray, origin: FloatArray, information: FloatArray) -> FloatArray:
+    """Coefficients of V(u) for ways that begin at these poses, shape (3, E, kappa, kappa); twists are about the origin."""
+    step = np.zeros(group.tangent_dim)
+    step[0] = -1.0
+    shear = group.adjoint(group.exp(step)) - np.eye(group.tangent_dim)
+    at_begin = world_to_body(group, poses, origin)
+    turned = at_begin.transpose(0, 2, 1)
+    middle = shear.T @ information + information @ shear
+    return np.stack([turned @ matrix @ at_begin for matrix in (information, middle, shear.T @ information @ shear)])
+
+
+def used_records(arcs: Arcs, which: IntArray, num_records: int) -> IntArray:
+    """Records of some arcs, each once."""
+    return np.flatnonzero(_marked(which, arcs.record, arcs.count, arcs.end, num_records))
+
+
+def allowed_arcs(arcs: Arcs, which: IntArray, allowed: BoolArray) -> IntArray:
+    """Those arcs all of whose records are allowed."""
+    return which[_all_allowed(which, arcs.record, arcs.count, arcs.end, allowed)]
+
+
+@compiled
+def _marked(which: IntArray, record: IntArray, count: IntArray, end: IntArray, num_records: int) -> BoolArray:
+    marked = np.zeros(num_records, np.bool_)
+    for a in which:
+        for r in range(record[a], record[a] + count[a]):
+            marked[r] = True
+        if end[a] >= 0:
+            marked[end[a]] = True
+    return marked
+
+
+@compiled
+def _all_allowed(which: IntArray, record: IntArray, count: IntArray, end: IntArray, allowed: BoolArray) -> BoolArray:
+    result = np.zeros(len(which), np.bool_)
+    for i in range(len(which)):
+        a = which[i]
+        kept = end[a] < 0 or allowed[end[a]]
+        for r in range(record[a], record[a] + count[a]):
+            kept = kept and allowed[r]
+        result[i] = kept
+    return result
+
+
+@compiled
+def _value_records(
+    used: IntArray,
+    number: IntArray,
+    way: IntArray,
+    piece: IntArray,
+    lengths: FloatArray,
+    delta: float,
+    on_ways: FloatArray,
+    closures: FloatArray,
+    first: IntArray,
+    start: IntArray,
+    poses: IntArray,
+    earliest: IntArray,
+    most: int,
+    worth: FloatArray,
+) -> None:
+    """Worth of the records used: closures, and odometry at the better end of the piece."""
+    largest = np.zeros(most + 1)
+    for r in used:
+        t, e = number[r] - 1, way[r]
+        p = first[e] + piece[r]
+        begin = min(piece[r] * delta, lengths[e])
+        end = min((piece[r] + 1) * delta, lengths[e])
+        if p == first[e + 1] - 1:
+            begin = lengths[e]
+        constant, linear, square = on_ways[0, t, e], on_ways[1, t, e], on_ways[2, t, e]
+        value = max(constant + begin * (linear + begin * square), constant + end * (linear + end * square))
+        if most == 0:
+            for q in range(start[p], start[p + 1]):
+                if earliest[poses[q]] <= number[r]:
+                    value += closures[t, poses[q]]
+        else:
+            for c in range(most):
+                largest[c] = 0.0
+            for q in range(start[p], start[p + 1]):
+                if earliest[poses[q]] <= number[r]:
+                    slope, c = closures[t, poses[q]], most - 1
+                    if slope > largest[c]:
+                        while c > 0 and largest[c - 1] < slope:
+                            largest[c] = largest[c - 1]
+                            c -= 1
+                        largest[c] = slope
+            for c in range(most):
+                value += largest[c]
+        worth[r] = value
+
+
+@compiled
+def _value_arcs(
+    which: IntArray,
+    way: IntArray,
+    record: IntArray,
+    count: IntArray,
+    end: IntArray,
+    last: IntArray,
+    worth: FloatArray,
+    charge: FloatArray,
+    remaining: FloatArray,
+) -> FloatArray:
+    values = np.empty(len(which))
+    for i in range(len(which)):
+        a = which[i]
+        value = -charge[way[a]] if way[a] >= 0 else 0.0
+        for r in range(record[a], record[a] + count[a]):
+            value += worth[r]
+        if end[a] >= 0:
+            value += worth[end[a]]
+        if last[a] >= 0:
+            value += remaining[last[a]]
+        values[i] = value
+    return values

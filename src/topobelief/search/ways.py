@@ -1,0 +1,221 @@
+"""Directed ways of a roadmap that a walk may drive, and which poses of the map are seen along them.
+
+The way of an edge is cut into pieces of length delta, measured from where it begins. A new pose that stands somewhere on piece
+i = 1 … N, or at the very end of the way (piece N + 1), may close loops with the poses that some place of the piece sees: a
+superset of what it will see where it really stands. With at most k closures a pose, the k nearest and no two beside each other
+on the odometry chain, only poses that may be among them count: those of which the nearest place of the piece is no further than
+the furthest one of the (3 k - 2)-nd pose that the whole piece sees, because k - 1 poses and the two neighbours of each are fewer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from topobelief.arrays import BoolArray, FloatArray, IntArray
+from topobelief.candidates.polyline import distances_to_segments
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.linalg.compiled import compiled
+from topobelief.search.bound import ClosureRule
+from topobelief.world import World
+from topobelief.world.sight import seen_parts
+
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Ways:
+    """Straight ways from vertex to vertex, each edge in both directions, and the way that leads from the robot to the start.
+
+    Attributes
+    ----------
+    source, target : shape (E,)
+        Vertices.
+    begin, end : shape (E, 2)
+        Metres, world frame.
+    lengths : shape (E,)
+        Metres.
+    """
+
+    source: IntArray
+    target: IntArray
+    begin: FloatArray
+    end: FloatArray
+    lengths: FloatArray
+
+    @property
+    def headings(self) -> FloatArray:
+        """Direction of travel, radians, shape (E,)."""
+        along = self.end - self.begin
+        return np.arctan2(along[:, 1], along[:, 0])
+
+    def poses(self, graph: PoseGraph, pose: int) -> FloatArray:
+        """Upright poses at the beginning of each way, heading along it, at the height of a pose of the graph."""
+        if graph.group.pose_size == 3:
+            return np.column_stack([self.begin, self.headings])
+        zero, half = np.zeros(len(self.source)), self.headings / 2
+        height = np.full(len(self.source), graph.positions[pose, 2])
+        return np.column_stack([self.begin, height, zero, zero, np.sin(half), np.cos(half)])
+
+
+@dataclass(frozen=True, slots=True)
+class Sightings:
+    """Poses of the map that new poses may close loops with, piece by piece.
+
+    Attributes
+    ----------
+    first : shape (E + 1,)
+        Pieces of way e are first[e], …, first[e + 1] - 1: those of length delta in order, then the end of the way.
+    start : shape (P + 1,), poses : shape (M,)
+        Compressed lists: indices into `seen`, for each piece.
+    seen : shape (m,)
+        Indices of the poses of the graph that any piece sees, ascending.
+    """
+
+    first: IntArray
+    start: IntArray
+    poses: IntArray
+    seen: IntArray
+
+
+def find_sightings(
+    graph: PoseGraph, ways: Ways, pose: int, delta: float, rule: ClosureRule, world: World | None, latest: int
+) -> Sightings:
+    """What is seen along each way.
+
+    Parameters
+    ----------
+    graph
+    ways
+    pose
+        Where the robot is.
+    delta
+        Length of a piece, metres.
+    rule
+    world
+    latest
+        The largest number of a new pose; poses that are not far enough back even for it are left out.
+    """
+    way, seen, lower, upper, squared_height = _seen_along(graph, ways, pose, rule, world, latest)
+    pieces = np.ceil(ways.lengths / delta - _ROUNDING).astype(np.int64)
+    first = np.concatenate([[0], np.cumsum(pieces + 1)])
+    offset = graph.positions[seen, :2] - ways.begin[way]
+    along = (ways.end - ways.begin)[way] / ways.lengths[way, None]
+    at = np.sum(offset * along, axis=1)
+    aside = np.sum(offset**2, axis=1) - at**2 + squared_height
+    order = np.argsort(way, kind="stable")
+    row_start = np.searchsorted(way[order], np.arange(len(ways.source) + 1))
+    always = (seen > pose) | (pose - seen + 1 >= rule.min_index_gap)
+    nearest = 0 if rule.max_per_pose is None else 3 * rule.max_per_pose - 2
+    columns = (lower[order], upper[order], at[order], np.maximum(aside, 0.0)[order], seen[order], always[order])
+    start, poses = _lists(first, row_start, ways.lengths, delta, nearest, *columns)
+    used = np.unique(poses)
+    return Sightings(first, start, np.searchsorted(used, poses), used)
+
+
+def _seen_along(
+    graph: PoseGraph, ways: Ways, pose: int, rule: ClosureRule, world: World | None, latest: int
+) -> tuple[IntArray, IntArray, FloatArray, FloatArray, FloatArray]:
+    """Way, pose, and metres along the way from where to where it may be seen; and its height over the way, squared."""
+    positions = graph.positions[:, :2]
+    height = graph.positions[:, 2] - graph.positions[pose, 2] if graph.group.position_dim == 3 else np.zeros(graph.num_poses)
+    middle, reach = (ways.begin + ways.end) / 2, ways.lengths / 2 + rule.radius
+    lists = KDTree(positions).query_ball_point(middle, reach)
+    way = np.repeat(np.arange(len(middle)), [len(near) for near in lists])
+    seen = np.concatenate([*(np.array(near, dtype=np.int64) for near in lists), np.zeros(0, dtype=np.int64)])
+    far_enough_back = (seen > pose) | (pose - seen + latest >= rule.min_index_gap)
+    distance = distances_to_segments(positions[seen], ways.begin[way], ways.end[way])
+    kept = far_enough_back & (distance**2 + height[seen] ** 2 < rule.radius**2) & _aligned(graph, ways, pose, way, seen, rule)
+    way, seen = way[kept], seen[kept]
+    along = (ways.end - ways.begin)[way] / ways.lengths[way, None]
+    offset = positions[seen] - ways.begin[way]
+    at = np.sum(offset * along, axis=1)
+    half = np.sqrt(np.maximum(rule.radius**2 - height[seen] ** 2 - np.sum(offset**2, axis=1) + at**2, 0.0))
+    lower, upper = np.maximum(at - half, 0.0), np.minimum(at + half, ways.lengths[way])
+    if world is not None:
+        parts = seen_parts(world, positions[seen], ways.begin[way], ways.end[way])
+        length = ways.lengths[way][parts.which]
+        lower, upper = np.maximum(lower[parts.which], parts.lower * length), np.minimum(upper[parts.which], parts.upper * length)
+        way, seen = way[parts.which], seen[parts.which]
+        overlap = lower <= upper
+        way, seen, lower, upper = way[overlap], seen[overlap], lower[overlap], upper[overlap]
+    return way, seen, lower, upper, height[seen] ** 2
+
+
+def _aligned(graph: PoseGraph, ways: Ways, pose: int, way: IntArray, seen: IntArray, rule: ClosureRule) -> BoolArray:
+    relative = graph.group.between(ways.poses(graph, pose)[way], graph.poses[seen])
+    turned = np.linalg.norm(graph.group.rotation_vector(relative), axis=1)
+    return turned <= rule.angle * (1 + _ROUNDING) + _ROUNDING
+
+
+@compiled
+def _lists(
+    first: IntArray,
+    row_start: IntArray,
+    lengths: FloatArray,
+    delta: float,
+    nearest: int,
+    lower: FloatArray,
+    upper: FloatArray,
+    at: FloatArray,
+    aside: FloatArray,
+    seen: IntArray,
+    always: BoolArray,
+) -> tuple[IntArray, IntArray]:
+    """Poses for each piece, as compressed lists.
+
+    Parameters
+    ----------
+    first, lengths, delta
+        Of the ways.
+    nearest
+        How many poses that a whole piece sees bound how far others may be; 0: no bound.
+    row_start, lower, upper, at, aside, seen, always
+        Sightings by way: from where to where (metres along it), where the pose is abeam, its squared distance from the line,
+        its index, and whether it is far enough back for every new pose.
+    """
+    num_pieces, longest = first[-1], 0
+    for e in range(len(lengths)):
+        longest = max(longest, row_start[e + 1] - row_start[e])
+    start, count = np.zeros(num_pieces + 1, np.int64), 0
+    poses = np.empty(1024, np.int64)
+    closest, furthest = np.empty(longest), np.empty(longest)
+    chosen = np.empty(longest, np.int64)
+    for e in range(len(lengths)):
+        for p in range(first[e], first[e + 1]):
+            i = p - first[e]
+            is_end = p == first[e + 1] - 1
+            begin = lengths[e] if is_end else max(i * delta - 1e-7 * delta, 0.0)
+            end = lengths[e] if is_end else min((i + 1) * delta + 1e-7 * delta, lengths[e])
+            num, num_whole = 0, 0
+            for r in range(row_start[e], row_start[e + 1]):
+                if lower[r] > end + 1e-9 or upper[r] < begin - 1e-9:
+                    continue
+                abeam = min(max(at[r], begin), end)
+                closest[num] = (at[r] - abeam) ** 2 + aside[r]
+                chosen[num] = seen[r]
+                if always[r] and lower[r] <= begin - 2e-9 * (begin > 0.0) and upper[r] >= end - 1e-8:
+                    furthest[num_whole] = max((at[r] - begin) ** 2, (at[r] - end) ** 2) + aside[r]
+                    num_whole += 1
+                num += 1
+            limit = np.inf
+            if 0 < nearest <= num_whole:
+                limit = np.sort(furthest[:num_whole])[nearest - 1] * (1.0 + 1e-8) + 1e-8  # ties to rounding
+            for c in range(num):
+                if closest[c] > limit:
+                    continue
+                repeated = False
+                for before in range(start[p], count):
+                    repeated = repeated or poses[before] == chosen[c]
+                if repeated:
+                    continue
+                if count == len(poses):
+                    more = np.empty(2 * count, np.int64)
+                    more[:count] = poses
+                    poses = more
+                poses[count] = chosen[c]
+                count += 1
+            start[p + 1] = count
+    return start, poses[:count].copy()
