@@ -18,8 +18,8 @@ Reason = Literal["proof", "gap", "deadline", "interrupt", "rest"]
 _BATCH = 64  # evaluations between two looks at the clock
 _WARM_UP = 128  # evaluations before the first step of the bound
 _PATIENCE = 800  # evaluations without improvement after which local search rests
-_STEPS_PER_LOOK = 8  # of the bound,
-_LEAST_PROGRESS = 0.02  # in which it closes at least this share of the gap, or rests
+_STEPS_PER_LOOK = 30  # of the bound, in which it closes at least
+_LEAST_PROGRESS = 0.02  # this share of the gap, or rests; with a deadline it goes on
 
 
 class SearchProgress(NamedTuple):
@@ -126,7 +126,7 @@ class AnytimeSearch:
     @property
     def _bound_rests(self) -> bool:
         """Whether its last steps closed hardly any of the gap."""
-        if len(self._bounds) <= _STEPS_PER_LOOK:
+        if len(self._bounds) <= _STEPS_PER_LOOK or self._end < math.inf:
             return False
         before = self._bounds[-_STEPS_PER_LOOK - 1]
         return self._bounds[-1] - before < _LEAST_PROGRESS * (self._best - before)

@@ -27,7 +27,9 @@ from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.planner import Planner
 from topobelief.search.anytime import AnytimeSearch, SearchProgress
+from topobelief.search.bound import WalkBound
 from topobelief.search.evaluations import Evaluations
+from topobelief.search.flow_bound import flow_bound
 from topobelief.search.front import on_front
 from topobelief.search.local_search import LocalSearch, spread_vias
 from topobelief.search.result import SearchResult, Way
@@ -94,7 +96,8 @@ def search_roadmap(
     num_alternatives
         How many other ways to return at most.
     spacing, turn, information, start
-        As for `predict_actions`; by default new poses stand every metre, and not where the path turns.
+        As for `predict_actions`; by default new poses stand every metre, and not where the path turns. With a `turn` there is no
+        lower bound.
     earlier
         A result on the same roadmap whose ways are tried too: after a search with a smaller limit the value is never worse.
     seed
@@ -136,8 +139,27 @@ def search_roadmap(
     near = KDTree(graph.positions[:, :2]).query(walks.roadmap.vertices)[0] < model.radius
     candidates = spread_vias(walks, near, _NUM_CANDIDATES)
     local = LocalSearch(walks, evaluations, candidates, rng=np.random.default_rng(seed))
+
+    def bound() -> WalkBound:
+        return flow_bound(
+            graph,
+            walks.roadmap,
+            start=walks.start,
+            goal=None if goal is None else walks.end,
+            max_length=walks.max_length,
+            objective=objective,
+            closures=model,
+            spacing=spacing,
+            information=omega,
+            world=world,
+            cost_per_metre=cost_per_metre,
+            return_to_start=return_to_start,
+            pose=begin.pose,
+        )
+
+    make_bound = bound if turn is None else None  # it knows of no poses at corners
     search = AnytimeSearch(
-        evaluations, local, None, began=began, deadline=deadline, gap=gap, on_progress=on_progress
+        evaluations, local, make_bound, began=began, deadline=deadline, gap=gap, on_progress=on_progress
     )
     stopped_by = search.run([walks.walk(()), *_walks_of(earlier, walks.roadmap)])
 
