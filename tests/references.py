@@ -55,6 +55,57 @@ def log_det_reference(graph: PoseGraph, part: str, *, held: Held = 0) -> float:
     return 2 * float(np.sum(np.log(np.abs(np.diagonal(triangle)))) + np.sum(np.log(norms)))
 
 
+def covariance_reference(graph: PoseGraph, *, held: int = 0) -> NDArray:
+    """Dense covariance with one pose held, positions and rotations in the world frame, shape (n, kappa, n, kappa).
+
+    The rows of `_rows` take perturbations in the frames of the poses; both parts of those are turned into the world.
+    """
+    rows_i, rows_j, information = _rows(graph, "joint", _float_frames(graph))
+    n, kappa, m = graph.num_poses, graph.tangent_dim, graph.num_edges
+    root = np.linalg.cholesky(information).transpose(0, 2, 1)
+    rows = np.zeros((m, kappa, n, kappa))
+    rows[np.arange(m), :, graph.edges[:, 0]] = root @ rows_i
+    rows[np.arange(m), :, graph.edges[:, 1]] = root @ rows_j
+    free = _free_nodes(n, held)
+    triangle = np.linalg.qr(rows[:, :, free].reshape(m * kappa, len(free) * kappa), mode="r")
+    inverse = np.linalg.inv(triangle)
+    covariance = np.zeros((n, kappa, n, kappa))
+    covariance[np.ix_(free, range(kappa), free, range(kappa))] = (inverse @ inverse.T).reshape(
+        len(free), kappa, len(free), kappa
+    )
+    turn, k = np.zeros((n, kappa, kappa)), graph.group.position_dim
+    turn[:, :k, :k] = _float_frames(graph)[0]
+    turn[:, k:, k:] = _float_frames(graph)[0] if kappa == 6 else 1.0
+    return np.einsum("iab,ibjc,jdc->iajd", turn, covariance, turn)
+
+
+def alignment_reference(positions: NDArray) -> NDArray:
+    """Pi, which takes out what a rigid motion does to positions, shape (n k, n k)."""
+    n, k = positions.shape
+    centred = positions - positions.mean(axis=0)
+    planes = [(a, b) for a in range(k) for b in range(a)]
+    motions = [np.tile(axis, n) for axis in np.eye(k)]
+    for a, b in planes:
+        turned = np.zeros_like(centred)
+        turned[:, a], turned[:, b] = -centred[:, b], centred[:, a]
+        motions.append(turned.ravel() / max(np.abs(centred).max(), 1e-300))
+    left, sizes, _ = np.linalg.svd(np.array(motions).T, full_matrices=False)
+    left = left[:, sizes > 1e-9 * sizes[0]]
+    return np.eye(n * k) - left @ left.T
+
+
+def error_reference(
+    graph: PoseGraph, after: PoseGraph, *, held: int = 0, covariance: NDArray | None = None, sample: NDArray | None = None
+) -> float:
+    """E of the poses of `graph`, or of a sample of them, where the covariance is that of the graph `after`; metres."""
+    k = graph.group.position_dim
+    nodes = np.arange(graph.num_poses) if sample is None else sample
+    covariance = covariance_reference(after, held=held) if covariance is None else covariance
+    positions = covariance[np.ix_(nodes, range(k), nodes, range(k))].reshape(len(nodes) * k, -1)
+    projection = alignment_reference(graph.positions[nodes])
+    return math.sqrt(max(0.0, np.trace(projection @ positions @ projection)) / len(nodes))
+
+
 def log_det_exact(graph: PoseGraph, part: str, *, held: Held = 0) -> Decimal:
     """The same in 80 digits, the numbers of the graph taken as they stand."""
     with localcontext(prec=DIGITS):

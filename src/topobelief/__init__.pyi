@@ -34,6 +34,8 @@ from .planning.decision import Decision as Decision
 from .planning.decision_quality import DecisionQuality as DecisionQuality
 from .planning.decision_quality import decision_quality as decision_quality
 from .planning.planner import Planner as Planner
+from .position_errors import ExpectedErrors as ExpectedErrors
+from .position_errors import expected_errors as expected_errors
 from .search.result import SearchResult as SearchResult
 from .search.roadmap_search import search_roadmap as search_roadmap
 from .signatures.spanning_trees import log_num_spanning_trees as log_num_spanning_trees

@@ -95,14 +95,16 @@ class IllConditionedError(TopobeliefError, ArithmeticError):
     what : str
         What was asked for.
     error_estimate : float
-        Estimated absolute error of what was asked for, nats (inf where the factorisation broke down).
+        Estimated absolute error of what was asked for (inf where the factorisation broke down).
+    unit : str
+        Its unit: "nats", or "m" for an expected error of the map.
     """
 
-    def __init__(self, what: str, error_estimate: float) -> None:
-        self.what = what
+    def __init__(self, what: str, error_estimate: float, *, unit: str = "nats") -> None:
+        self.what, self.unit = what, unit
         self.error_estimate = math.inf if math.isnan(error_estimate) else error_estimate
         known = math.isfinite(self.error_estimate)
-        loss = f"estimated error {error_estimate:.1e} nats" if known else "rounding leaves no digit"
+        loss = f"estimated error {error_estimate:.1e} {unit}" if known else "rounding leaves no digit"
         super().__init__(
             f"{what}: the graph is too ill-conditioned for double precision ({loss}); "
             "check the units and the information matrices for extreme ratios"

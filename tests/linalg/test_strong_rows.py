@@ -85,7 +85,7 @@ def test_it_is_the_value_that_qr_gives():
     graph = winding(60, np.random.default_rng(3), [1.3e10, 1.7e12, 1.1e13])
     form = fisher_rows(graph).joint()
     solver = LogDetSolver(graph.edges, 60, 59)
-    pattern = solver._pattern(3)
+    pattern = solver.pattern(3)
     by_qr = log_det._by_qr(pattern.dense_rows(form), pattern.magnitude(form), 0.0)
     by_strong_rows = solver._by_strong_rows(form, 0.0)
     assert by_strong_rows.error < 1e-8

@@ -11,6 +11,7 @@ Nothing here knows of paths. `closures_with_prior` takes places with headings, a
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -96,7 +97,8 @@ class ClosureModel:
         return cls.by_hand(closure_radius=2.0, closure_angle=1.0, min_index_gap=2)
 
     def __str__(self) -> str:
-        chance = f"{100 * self.probability:.2g} % of opportunities"
+        percent = 100 * self.probability
+        chance = f"{percent:.0f} % of opportunities" if percent >= 10 else f"{percent:.2g} % of opportunities"
         if self.max_per_pose is None:
             heading = "" if self.angle >= math.pi * (1 - _ROUNDING) else f" and {self.angle:.3g} rad"
             rule = f"all poses within {self.radius:.3g} m{heading}, at least {self.min_index_gap} steps apart"
@@ -185,6 +187,51 @@ def closures_among(
     pairs = near[near[:, 0] - near[:, 1] >= model.min_index_gap]
     chained = np.ones(len(poses) - 1, dtype=bool)
     return closing_pairs(group, poses, poses, pairs, model, chained=chained, left=left, world=world)
+
+
+def closures_of_paths(
+    graph: PoseGraph,
+    paths: Sequence[FloatArray],
+    model: ClosureModel,
+    *,
+    start: int | None = None,
+    world: World | None = None,
+) -> list[IntArray]:
+    """Closures of the new poses of each of several paths, driven from one start.
+
+    A new pose first closes loops with poses of the graph, as it would if it were the only one (`closures_with_prior`). If that
+    leaves some of `model.max_per_pose`, it closes loops with new poses of its path before it.
+
+    Parameters
+    ----------
+    graph
+    paths
+        New poses, each of shape (L, pose_size), L >= 0, in the order in which they are driven.
+    model, start, world
+        As `closures_with_prior` has them.
+
+    Returns
+    -------
+    list of shape (C, 2)
+        New pose, old pose; indices of the graph, then n, n + 1, ... for the new poses of the path; sorted.
+    """
+    if not paths:
+        return []
+    n, sizes = graph.num_poses, [len(poses) for poses in paths]
+    ends = np.cumsum(sizes)
+    steps = np.concatenate([np.arange(1, size + 1) for size in sizes])
+    with_prior = closures_with_prior(graph, np.concatenate(paths), model, steps=steps, start=start, world=world)
+    cuts = np.searchsorted(with_prior[:, 0], ends[:-1])
+    found: list[IntArray] = []
+    for poses, end, closing in zip(paths, ends.tolist(), np.split(with_prior, cuts), strict=True):
+        own = closing - np.array([end - len(poses), 0])
+        left = None
+        if model.max_per_pose is not None:
+            left = model.max_per_pose - np.bincount(own[:, 0], minlength=len(poses))
+        among = closures_among(graph.group, poses, model, left=left, world=world)
+        pairs = np.concatenate([own + np.array([n, 0]), among + n])
+        found.append(pairs[np.lexsort(pairs.T[::-1])])
+    return found
 
 
 def closing_pairs(

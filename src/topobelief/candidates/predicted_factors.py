@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from topobelief.arrays import FloatArray, IntArray
-from topobelief.candidates.closures import ClosureModel, closures_among, closures_with_prior
+from topobelief.arrays import FloatArray
+from topobelief.candidates.closures import ClosureModel, closures_of_paths
 from topobelief.candidates.learned_closures import learn_closures
 from topobelief.candidates.new_poses import poses_along
 from topobelief.candidates.polyline import checked_path, path_length
@@ -103,7 +103,7 @@ def predict_actions(
         if world is not None:
             _require_free(world, ways[-1], name)
     poses = [poses_along(graph, begin.pose, way.full, spacing=spacing, turn=turn) for way in ways]
-    found = _closures(graph, begin, poses, model, world)
+    found = closures_of_paths(graph, poses, model, start=begin.pose, world=world)
     actions: list[Action] = []
     for index, (way, new_poses, closing) in enumerate(zip(ways, poses, found, strict=True)):
         num_new = len(new_poses)
@@ -133,30 +133,6 @@ def _chosen_model(
     if by_hand:
         raise InvalidInputError(f"expected closures or a rule by hand, got both; leave out {' and '.join(by_hand)}")
     return closures
-
-
-def _closures(
-    graph: PoseGraph, start: Start, paths: list[FloatArray], model: ClosureModel, world: World | None
-) -> list[IntArray]:
-    """Closures (new, old) of the new poses of each path: with poses of the graph first, then among themselves; sorted."""
-    n, sizes = graph.num_poses, [len(poses) for poses in paths]
-    if not paths:
-        return []
-    ends = np.cumsum(sizes)
-    steps = np.concatenate([np.arange(1, size + 1) for size in sizes])
-    every = np.concatenate(paths)
-    with_prior = closures_with_prior(graph, every, model, steps=steps, start=start.pose, world=world)
-    cuts = np.searchsorted(with_prior[:, 0], ends[:-1])
-    found: list[IntArray] = []
-    for poses, end, closing in zip(paths, ends.tolist(), np.split(with_prior, cuts), strict=True):
-        own = closing - np.array([end - len(poses), 0])
-        left = None
-        if model.max_per_pose is not None:
-            left = model.max_per_pose - np.bincount(own[:, 0], minlength=len(poses))
-        among = closures_among(graph.group, poses, model, left=left, world=world)
-        pairs = np.concatenate([own + np.array([n, 0]), among + n])
-        found.append(pairs[np.lexsort(pairs.T[::-1])])
-    return found
 
 
 def default_information(graph: PoseGraph) -> FloatArray:

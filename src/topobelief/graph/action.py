@@ -114,6 +114,11 @@ class Action(ReadOnlyArrays):
         """Edges beyond the one that each new pose needs to hang on the graph."""
         return len(self.edges) - self.num_new_poses
 
+    @property
+    def expected_closures(self) -> float:
+        """`num_closures`, each as often as it is probable."""
+        return self.num_closures if self.probabilities is None else float(self.probabilities.sum()) - self.num_new_poses
+
 
 def _checked_probabilities(probabilities: ArrayLike, num_edges: int) -> FloatArray:
     chances = frozen_floats(probabilities, name="probabilities")

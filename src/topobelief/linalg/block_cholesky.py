@@ -245,6 +245,13 @@ def finish_column(
 @compiled
 def solve(start: IntArray, rows: Int32Array, diagonal: FloatArray, blocks: FloatArray, values: FloatArray) -> None:
     """Replace `values`, shape (n, b, s) in order of elimination, by M^-1 values."""
+    solve_lower(start, rows, diagonal, blocks, values)
+    solve_upper(start, rows, diagonal, blocks, values)
+
+
+@compiled
+def solve_lower(start: IntArray, rows: Int32Array, diagonal: FloatArray, blocks: FloatArray, values: FloatArray) -> None:
+    """Replace `values`, shape (n, b, s) in order of elimination, by l^-1 values."""
     n, b, s = values.shape
     for j in range(n):
         for c in range(b):
@@ -259,6 +266,12 @@ def solve(start: IntArray, rows: Int32Array, diagonal: FloatArray, blocks: Float
                 for d in range(b):
                     for m in range(s):
                         values[i, c, m] -= blocks[p, c, d] * values[j, d, m]
+
+
+@compiled
+def solve_upper(start: IntArray, rows: Int32Array, diagonal: FloatArray, blocks: FloatArray, values: FloatArray) -> None:
+    """Replace `values`, shape (n, b, s) in order of elimination, by l^-T values."""
+    n, b, s = values.shape
     for j in range(n - 1, -1, -1):
         for p in range(start[j], start[j + 1]):
             i = rows[p]

@@ -18,6 +18,9 @@ UNIT_ROUNDOFF = float(np.finfo(np.float64).eps) / 2
 MAX_ERROR_NATS = 0.1
 """An entropy or a signature that is not known to this is refused: it could not rank candidates."""
 
+MAX_RELATIVE_ERROR = 0.01
+"""An expected error of the map, metres, that is not known to this part of itself is refused."""
+
 Number = TypeVar("Number", float, FloatArray)
 """A float, or an array of shape (K,)."""
 
@@ -59,8 +62,30 @@ class Estimate(Generic[Number]):
         IllConditionedError
             If the error of a single value exceeds `MAX_ERROR_NATS`; says of `what`.
         """
+        return self._known(what, MAX_ERROR_NATS, "nats")
+
+    def known_length(self, what: str) -> Estimate[Number]:
+        """The same for a length of at least 0, metres: its error has to be small relative to itself.
+
+        Raises
+        ------
+        IllConditionedError
+            If the error of a single value exceeds `MAX_RELATIVE_ERROR` of it; says of `what`.
+        """
+        return self._known(what, MAX_RELATIVE_ERROR * abs(self.value), "m")
+
+    def _known(self, what: str, limit: float | Number, unit: str) -> Estimate[Number]:
         if isinstance(self.value, np.ndarray):
-            return Estimate(np.where(self.error <= MAX_ERROR_NATS, self.value, np.nan), self.error)
-        if not self.error <= MAX_ERROR_NATS:
-            raise IllConditionedError(what, float(self.error))
+            return Estimate(np.where(self.error <= limit, self.value, np.nan), self.error)
+        if not self.error <= limit:
+            raise IllConditionedError(what, float(self.error), unit=unit)
         return self
+
+    def root(self) -> Estimate[Number]:
+        """The square root of a quantity that is at least 0; |sqrt(x + e) - sqrt(x)| is at most sqrt(e) and e / sqrt(x)."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            value = np.sqrt(np.maximum(self.value, 0.0))
+            error = np.fmin(np.sqrt(self.error), np.divide(self.error, value)) + UNIT_ROUNDOFF * value
+        if isinstance(self.value, np.ndarray):
+            return Estimate(value, error)
+        return Estimate(float(value), float(error))  # pyright: ignore[reportReturnType]  (a float is what Number is here)

@@ -83,7 +83,7 @@ class LogDetSolver:
 
         0 where there are no free nodes; error inf where the factorisation breaks down.
         """
-        if self._pattern(form.block_size).size == 0:
+        if self.pattern(form.block_size).size == 0:
             return Estimate(0.0, 0.0)
         result, blocks = self._by_sparse_factors(form, shift), None
         if result.error > _SMALL_ERROR and form.gauge_free and not shift:
@@ -94,7 +94,7 @@ class LogDetSolver:
     @_may_overflow
     def hadamard(self, form: EdgeForm, *, shift: float = 0.0) -> Estimate[float]:
         """Sum of ln det of the diagonal blocks, an upper bound of `log_det` (Hadamard and Fischer)."""
-        pattern = self._pattern(form.block_size)
+        pattern = self.pattern(form.block_size)
         if pattern.size == 0:
             return Estimate(0.0, 0.0)
         blocks = pattern.diagonal_blocks(form) + shift * np.eye(form.block_size)
@@ -114,14 +114,15 @@ class LogDetSolver:
                 root_error = 2 * form.root_error  # an edge is seen at both ends
         return form.multiplicity * _finite(Estimate(math.fsum(values), float(errors.sum()) + root_error))
 
-    def _pattern(self, block_size: int) -> BlockPattern:
+    def pattern(self, block_size: int) -> BlockPattern:
+        """Where the blocks of the free nodes go."""
         if block_size not in self._patterns:
             self._patterns[block_size] = BlockPattern.build(self._edges, self._free, block_size)
         return self._patterns[block_size]
 
     def _by_sparse_factors(self, form: EdgeForm, shift: float) -> Estimate[float]:
         """By one factor, and with strong rows apart where the error makes that worth its time."""
-        factor = self._factor(form, shift)
+        factor = self.factor(form, shift)
         known = _UNKNOWN if factor is None else factor.log_det
         return known if known.error <= _LARGE_ERROR else _better(known, self._by_strong_rows(form, shift))
 
@@ -157,7 +158,7 @@ class LogDetSolver:
 
     def _or_by_qr(self, known: Estimate[float], form: EdgeForm, shift: float) -> Estimate[float]:
         """`known`, or what is known better by QR, as far as the error makes that worth its time."""
-        pattern = self._pattern(form.block_size)
+        pattern = self.pattern(form.block_size)
         limit = _LARGE_ERROR
         if pattern.size <= _SMALL_QR_SIZE:
             limit = _SMALL_RELATIVE_ERROR * max(1.0, abs(known.value))
@@ -168,8 +169,8 @@ class LogDetSolver:
 
     def _by_strong_rows(self, form: EdgeForm, shift: float) -> Estimate[float]:
         """The other rows factored, the strong ones added to that."""
-        pattern, strong = self._pattern(form.block_size), StrongRows.of(form)
-        others = None if strong is None else self._factor(strong.weakened, shift)
+        pattern, strong = self.pattern(form.block_size), StrongRows.of(form)
+        others = None if strong is None else self.factor(strong.weakened, shift)
         if strong is None or others is None:
             return _UNKNOWN
         rows = pattern.scattered(strong.edge, strong.rows_i, strong.rows_j)
@@ -179,9 +180,9 @@ class LogDetSolver:
         error = UNIT_ROUNDOFF * (_OPERATIONS * error + abs(value))
         return _finite(Estimate(others.log_det.value + value, 2 * others.log_det.error + error))
 
-    def _factor(self, form: EdgeForm, shift: float) -> _Factor | None:
-        """None where a pivot is not positive, or nothing is known of the error."""
-        pattern = self._pattern(form.block_size)
+    def factor(self, form: EdgeForm, shift: float = 0.0) -> Factor | None:
+        """L D L^T of the form's matrix; None where a pivot is not positive, or nothing is known of the error."""
+        pattern = self.pattern(form.block_size)
         upper = pattern.upper(form, shift=shift)
         try:
             if pattern.block_size in self._factors:
@@ -199,11 +200,11 @@ class LogDetSolver:
         variances = _variances(factor, form, pattern, shift)
         error = factor_error(upper, lower, order, pattern.magnitude(form), variances, form.block_size)
         error = UNIT_ROUNDOFF * (error + float(np.abs(log_pivots).sum())) + form.root_error
-        return _Factor(Estimate(math.fsum(log_pivots), error), variances, factor.solve) if math.isfinite(error) else None
+        return Factor(Estimate(math.fsum(log_pivots), error), variances, factor.solve) if math.isfinite(error) else None
 
 
 @dataclass(frozen=True, slots=True)
-class _Factor:
+class Factor:
     """What is known of a factored matrix M."""
 
     log_det: Estimate[float]

@@ -7,6 +7,7 @@ the c-th row of R^+ is the standard deviation of variable c.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,38 +19,81 @@ from topobelief.linalg.estimate import UNIT_ROUNDOFF
 ASSEMBLY_OPERATIONS = 16  # roundings behind one term of a row
 
 
-def log_det_by_qr(rows: FloatArray, magnitudes: FloatArray) -> tuple[float, float]:
-    """2 ln |det R|, columns scaled to unit norm, largest rows first, columns pivoted; with its error in units of roundoff.
+@dataclass(frozen=True, slots=True)
+class ScaledTriangle:
+    """R^T R of rows whose columns are scaled to unit norm and permuted.
 
-    Parameters
+    Attributes
     ----------
-    rows : shape (m, n)
-    magnitudes : shape (n,)
-        Size of the terms from which each column was computed.
+    triangle : shape (n, n)
+        Upper.
+    norms : shape (n,)
+        Of the columns, in their own order.
+    permutation : shape (n,)
+        The column at each place of the triangle.
+    error
+        Of ln det, in units of roundoff, without that of the logarithms; also the relative error of v^T (R^T R)^-1 v for any v.
+    """
+
+    triangle: FloatArray
+    norms: FloatArray
+    permutation: IntArray
+    error: float
+
+    @staticmethod
+    def of(rows: FloatArray, magnitudes: FloatArray) -> ScaledTriangle | None:
+        """Largest rows first, columns pivoted; None where the rows do not have full rank in double precision.
+
+        Parameters
+        ----------
+        rows : shape (m, n)
+        magnitudes : shape (n,)
+            Size of the terms from which each column was computed.
+        """
+        size = rows.shape[1]
+        if len(rows) < size or not np.isfinite(rows).all():
+            return None
+        norms = np.linalg.norm(rows, axis=0)
+        if not (norms > 0).all():
+            return None
+        scaled = rows / norms
+        scaled = scaled[np.argsort(-np.abs(scaled).max(axis=1), kind="stable")]
+        triangle, permutation = _pivoted_qr(scaled)
+        if size and np.abs(np.diagonal(triangle)).min() <= UNIT_ROUNDOFF:
+            return None
+        inverse = linalg.solve_triangular(triangle, np.eye(size))
+        deviations = np.empty(size)
+        deviations[permutation] = np.linalg.norm(inverse, axis=1)
+        relative = math.sqrt(size) + ASSEMBLY_OPERATIONS * magnitudes / norms
+        return ScaledTriangle(triangle, norms, permutation, 2 * float(relative @ deviations))
+
+    @property
+    def log_det(self) -> tuple[float, float]:
+        """ln det (R^T R) and its error in units of roundoff."""
+        logarithms = np.concatenate([np.log(np.abs(np.diagonal(self.triangle))), np.log(self.norms)])
+        return 2 * math.fsum(logarithms), self.error + 2 * float(np.abs(logarithms).sum())
+
+    def half_solutions(self, columns: FloatArray) -> FloatArray:
+        """R^-T A, shape (n, s), whose squared norm is tr(A^T (R^T R)^-1 A)."""
+        ordered = (columns / self.norms[:, None])[self.permutation]
+        return np.asarray(linalg.solve_triangular(self.triangle, ordered, trans="T"), dtype=np.float64)
+
+    def solutions(self, halves: FloatArray) -> FloatArray:
+        """(R^T R)^-1 A from R^-T A."""
+        solved = np.empty_like(halves)
+        solved[self.permutation] = linalg.solve_triangular(self.triangle, halves)
+        return solved / self.norms[:, None]
+
+
+def log_det_by_qr(rows: FloatArray, magnitudes: FloatArray) -> tuple[float, float]:
+    """ln det (R^T R), with its error in units of roundoff; parameters as for `ScaledTriangle.of`.
 
     Returns
     -------
     nan and inf where the rows do not have full rank in double precision.
     """
-    size = rows.shape[1]
-    if len(rows) < size or not np.isfinite(rows).all():
-        return math.nan, math.inf
-    norms = np.linalg.norm(rows, axis=0)
-    if not (norms > 0).all():
-        return math.nan, math.inf
-    scaled = rows / norms
-    scaled = scaled[np.argsort(-np.abs(scaled).max(axis=1), kind="stable")]
-    triangle, permutation = _pivoted_qr(scaled)
-    diagonal = np.abs(np.diagonal(triangle))
-    if diagonal.min() <= UNIT_ROUNDOFF:
-        return math.nan, math.inf
-    inverse = linalg.solve_triangular(triangle, np.eye(size))
-    deviations = np.empty(size)
-    deviations[permutation] = np.linalg.norm(inverse, axis=1)
-    relative = math.sqrt(size) + ASSEMBLY_OPERATIONS * magnitudes / norms
-    logarithms = np.concatenate([np.log(diagonal), np.log(norms)])
-    error = 2 * float(relative @ deviations + np.abs(logarithms).sum())
-    return 2 * math.fsum(logarithms), error
+    triangle = ScaledTriangle.of(rows, magnitudes)
+    return (math.nan, math.inf) if triangle is None else triangle.log_det
 
 
 def log_dets_of_squares(rows: FloatArray, magnitudes: FloatArray) -> tuple[float, float]:

@@ -43,7 +43,8 @@ _LARGEST_SET = 40  # walks whose weights are optimised
 _TOLL_TRIALS = 3  # longest paths a step, to find the price of a metre
 _STEPS_BEFORE_SPLIT = 3
 _SLOW = 0.15  # of what is missing to the best value: a part whose bound rises by less a step is split
-_CONVERGED = 0.3  # of what is missing to the best value: a part whose own optimum is known that well is split
+_SLOW_STEPS = 4  # after so many, a part that cannot be split is left as it is
+_LEAST_WEIGHT = 1e-3  # of walks that count where parts are split
 
 
 @dataclass(eq=False, slots=True)
@@ -59,7 +60,7 @@ class _Part:
     ahead: float = 0.0  # D at the longest path
     steps: int = 0
     fresh: int = 0  # steps since it was made
-    slow: bool = False
+    slow: int = 0  # latest steps in a row that hardly raised the bound
 
 
 class FlowBound:
@@ -118,12 +119,19 @@ class FlowBound:
         if not self._open:
             return []
         _, _, part = heapq.heappop(self._open)
-        children = self._split(part) if self._should_split(part) else None
+        parts = [part]
+        if part.fresh >= _STEPS_BEFORE_SPLIT and part.slow >= 1:
+            halves = self._split(part) if math.isfinite(self._best) else None
+            if halves is not None:
+                parts = halves
+            elif part.slow >= _SLOW_STEPS:
+                self._closed = min(self._closed, part.bound)
+                parts = []
         found: list[IntArray] = []
-        for child in [part] if children is None else children:
-            found.extend(self._improved(child))
-            if child.bound < self._best and len(child.arcs):
-                heapq.heappush(self._open, (child.bound, next(self._counter), child))
+        for each in parts:
+            found.extend(self._improved(each))
+            if len(each.arcs) and each.bound < self._best:
+                heapq.heappush(self._open, (each.bound, next(self._counter), each))
         self.num_steps += 1
         self._update()
         return found
@@ -178,10 +186,12 @@ class FlowBound:
         else:
             bound = criterion.least(gain, total)
             threshold = criterion.needed(gain, self._best) if math.isfinite(self._best) else -math.inf
+        value = criterion.to_objective(criterion.of_gain(gain) + criterion.linear(plan))
         bound = criterion.to_objective(bound)
         bound -= _ROUNDING * (abs(bound) + abs(criterion.of_gain(0.0)))
         missing = self._best - part.bound
-        part.slow = math.isfinite(missing) and bound - part.bound < _SLOW * missing
+        slow = bound - part.bound < (_SLOW * missing if math.isfinite(missing) else _SLOW * (value - part.bound))
+        part.slow = part.slow + 1 if slow else 0
         part.bound = max(part.bound, bound)
         if math.isfinite(threshold):
             self._thin(part, weights, lengths, threshold + offset - part.toll * self._max_length)
@@ -240,6 +250,7 @@ class FlowBound:
             return
         plans = [course.plan for course in part.courses]
         lengths = np.array([plan.length for plan in plans])
+        touched = np.flatnonzero(sum(plan.closures.any(axis=0) for plan in plans))
         criterion = self._criterion
         linear = np.array([criterion.linear(plan) for plan in plans])
         scale = 1e-2 * max(abs(criterion.of_gain(0.0)), 1e-300) if criterion.kind == "error" else 1.0
@@ -247,7 +258,7 @@ class FlowBound:
         def fun(weights: FloatArray) -> tuple[float, FloatArray]:
             weights = np.maximum(weights, 0.0)
             weights = weights / weights.sum()
-            gained, slopes = gain_and_slopes(self._prior, criterion.kind, mixture(plans, weights), everywhere=False)
+            gained, slopes = gain_and_slopes(self._prior, criterion.kind, mixture(plans, weights), among=touched)
             rate = criterion.rate(gained)
             gradient = linear - rate * np.array([slopes.of(plan) for plan in plans])
             return (criterion.of_gain(gained) + float(linear @ weights)) / scale, gradient / scale
@@ -284,34 +295,42 @@ class FlowBound:
         vertices = self._vertices[places]
         return vertices[vertices >= 0]
 
-    def _should_split(self, part: _Part) -> bool:
-        return math.isfinite(self._best) and part.fresh >= _STEPS_BEFORE_SPLIT and part.slow and len(part.courses) > 1
-
     def _split(self, part: _Part) -> list[_Part] | None:
-        """Two parts by the side of a line on which one of the new poses stands; None where all walks agree."""
-        line = self._dividing_line(part)
-        if line is None:
-            return None
-        number, normal, at = line
-        records, arcs = self._rewards.layers.records, self._rewards.layers.arcs
-        is_it = records.number == number
-        one, other = self._begin @ normal, self._end @ normal
-        sides = (np.minimum(one, other) <= at, np.maximum(one, other) >= at)
-        children: list[_Part] = []
-        for side in sides:
-            allowed = ~is_it | side
-            kept = allowed_arcs(arcs, part.arcs, allowed)
-            within = np.array([bool(allowed[course.records].all()) for course in part.courses])
-            courses = [course for course, keep in zip(part.courses, within, strict=True) if keep]
-            weights = part.weights[within]
-            total = weights.sum()
-            weights = weights / total if total > 0 else np.full(len(courses), 1 / max(len(courses), 1))
-            child = _Part(kept, used_records(arcs, kept, len(records.number)), courses, weights, part.bound, part.toll)
-            children.append(child)
-        return children
+        """Two parts of the walks, by what separates the weight of the active set best; None where its walks agree.
 
-    def _dividing_line(self, part: _Part) -> tuple[int, FloatArray, float] | None:
-        """Number of a new pose, a unit vector, and where along it to cut: what separates the walks' weight best."""
+        That is the side of a line on which one of the new poses stands, or the number of new poses.
+        """
+        layers = self._rewards.layers
+        line, count = self._dividing_line(part), self._dividing_number(part)
+        if line is None and count is None:
+            return None
+        if count is None or (line is not None and line[0] >= count[0]):
+            assert line is not None
+            _, number, normal, at = line
+            is_it = layers.records.number == number
+            one, other = self._begin @ normal, self._end @ normal
+            kept = [
+                allowed_arcs(layers.arcs, part.arcs, ~is_it | side)
+                for side in (np.minimum(one, other) <= at, np.maximum(one, other) >= at)
+            ]
+        else:
+            last = layers.arcs.last[part.arcs]
+            kept = [part.arcs[(last < 0) | (last <= count[1])], part.arcs[(last < 0) | (last > count[1])]]
+        return [self._restricted(part, arcs) for arcs in kept]
+
+    def _restricted(self, part: _Part, arcs: IntArray) -> _Part:
+        """The walks of a part that take these arcs only."""
+        layers = self._rewards.layers
+        within = np.array([bool(np.isin(course.arcs, arcs, assume_unique=True).all()) for course in part.courses], dtype=bool)
+        courses = [course for course, keep in zip(part.courses, within, strict=True) if keep]
+        weights = part.weights[within]
+        total = float(weights.sum())
+        weights = weights / total if total > 0 else np.full(len(courses), 1 / max(len(courses), 1))
+        records = used_records(layers.arcs, arcs, len(layers.records.number))
+        return _Part(arcs, records, courses, weights, part.bound, part.toll)
+
+    def _dividing_line(self, part: _Part) -> tuple[float, int, FloatArray, float] | None:
+        """Score, number of a new pose, unit vector, and where along it to cut."""
         records = self._rewards.layers.records
         middle = (self._begin + self._end) / 2
         best: tuple[float, int, FloatArray, float] | None = None
@@ -321,33 +340,46 @@ class FlowBound:
             weights: list[float] = []
             for course, number, weight in zip(part.courses, numbers, part.weights.tolist(), strict=True):
                 at = np.flatnonzero(number == t)
-                if at.size and weight > 1e-3:
+                if at.size and weight > _LEAST_WEIGHT:
                     places.append(middle[course.records[at[0]]])
                     weights.append(weight)
             if len(places) < 2:
                 continue
-            cut = _best_cut(np.array(places), np.array(weights))
+            cut = _best_cut(np.array(places), np.array(weights), self._rewards.delta)
             if cut is not None and (best is None or cut[0] > best[0]):
                 best = cut[0], t, cut[1], cut[2]
-        return None if best is None else best[1:]
+        return best
+
+    def _dividing_number(self, part: _Part) -> tuple[float, int] | None:
+        """Score, and up to how many new poses the walks of one side have."""
+        used = part.weights > _LEAST_WEIGHT
+        number = np.array([course.plan.num_poses for course, keep in zip(part.courses, used, strict=True) if keep])
+        if len(number) < 2 or np.ptp(number) == 0:
+            return None
+        spacing = self._rewards.delta * self._rewards.layers.pieces_per_pose
+        cut = _cut_along(spacing * number, part.weights[used], 0.5 * spacing)
+        return None if cut is None else (cut[0], math.floor(cut[1] / spacing))
 
 
-def _best_cut(places: FloatArray, weights: FloatArray) -> tuple[float, FloatArray, float] | None:
-    """Variance between the two sides, the normal of the line, and its place: the best of lines across the main axis."""
+def _best_cut(places: FloatArray, weights: FloatArray, least: float) -> tuple[float, FloatArray, float] | None:
+    """Score, normal of a line across the main axis of some places, and where along it the line is."""
     mean = weights @ places / weights.sum()
     scatter = (places - mean).T @ ((places - mean) * weights[:, None])
     normal = np.linalg.eigh(scatter)[1][:, -1]
-    along = places @ normal
-    order = np.argsort(along)
-    along, share = along[order], weights[order] / weights.sum()
+    cut = _cut_along(places @ normal, weights, least)
+    return None if cut is None else (cut[0], normal, cut[1])
+
+
+def _cut_along(values: FloatArray, weights: FloatArray, least: float) -> tuple[float, float] | None:
+    """Where to cut numbers, further than `least` apart, so that the variance between the two sides is largest; that and the place."""
+    order = np.argsort(values)
+    values, share = values[order], weights[order] / weights.sum()
     left = np.cumsum(share)[:-1]
-    below = np.cumsum(share * along)[:-1] / np.maximum(left, 1e-12)
-    above = (share @ along - left * below) / np.maximum(1 - left, 1e-12)
-    between = left * (1 - left) * (above - below) ** 2
+    below = np.cumsum(share * values)[:-1] / left
+    above = (share @ values - left * below) / np.maximum(1 - left, _LEAST_WEIGHT)
+    between = np.where(np.diff(values) > least, left * (1 - left) * (above - below) ** 2, 0.0)
     cut = int(np.argmax(between))
-    if between[cut] < 1e-4 or along[cut + 1] - along[cut] < 1e-3:
-        return None
-    return float(between[cut]), normal, float((along[cut] + along[cut + 1]) / 2)
+    return (float(between[cut]), float((values[cut] + values[cut + 1]) / 2)) if between[cut] > 0 else None
 
 
 def flow_bound(

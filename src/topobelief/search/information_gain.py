@@ -58,17 +58,17 @@ def gain(prior: ReducedPrior, kind: Kind, plan: Plan) -> float:
     return _Posterior(prior, kind, plan).gain
 
 
-def gain_and_slopes(prior: ReducedPrior, kind: Kind, plan: Plan, *, everywhere: bool = True) -> tuple[float, Slopes]:
+def gain_and_slopes(prior: ReducedPrior, kind: Kind, plan: Plan, *, among: IntArray | None = None) -> tuple[float, Slopes]:
     """What a plan gains, and the gradient there.
 
     Parameters
     ----------
     prior, kind, plan
-    everywhere
-        Whether closures count with all seen poses, or only with those that the plan closes loops with (0 elsewhere).
+    among : shape (w,), optional
+        Seen poses, ascending, among them all that the plan closes loops with: closures with others count 0. Default: all.
     """
     posterior = _Posterior(prior, kind, plan)
-    return posterior.gain, posterior.slopes(everywhere=everywhere)
+    return posterior.gain, posterior.slopes(np.arange(len(prior.closures)) if among is None else among)
 
 
 class _Posterior:
@@ -114,10 +114,9 @@ class _Posterior:
             result += float(np.log(np.diagonal(self.root_new)).sum())
         return result
 
-    def slopes(self, *, everywhere: bool) -> Slopes:
+    def slopes(self, seen: IntArray) -> Slopes:
         prior, kappa = self.prior, self.prior.tangent_dim
-        seen = np.arange(len(prior.closures)) if everywhere else self.touched
-        columns = np.arange(len(prior.sigma)) if everywhere else self.index
+        columns = (seen[:, None] * kappa + np.arange(kappa)).ravel()
         own = np.searchsorted(columns, self.index)
         rows = prior.sigma[np.ix_(self.index, columns)]
         known = self.effect @ rows  # F: P_:: = Sigma_:: - Sigma_:m' F
@@ -149,7 +148,7 @@ class _Posterior:
         slope -= 2 * (cross.transpose(0, 2, 1, 3) * weight).sum(axis=(2, 3))
         odometry = each.copy()
         odometry[1:] += each[:-1] - new[at[1:], at[:-1]] - new[at[:-1], at[1:]]
-        if everywhere:
+        if len(seen) == len(prior.closures):
             return Slopes(scale * slope, scale * odometry)
         full = np.zeros(self.plan.closures.shape)
         full[:, seen] = scale * slope

@@ -1,0 +1,110 @@
+"""The bound by flows: no walk is better, and its walks are good ones."""
+
+import math
+
+import numpy as np
+import pytest
+from roadmap_walks import Case, random_case
+
+import topobelief as tb
+from topobelief.search.flow_bound import FlowBound, flow_bound
+
+OBJECTIVES = ("error", "map", "joint", "per_pose")
+WITH_WALKS = (4, 8, 17, 62, 85, 96, 106, 111)  # of cases with 15 to 70 walks
+
+
+def _run(case: Case, objective: str, best: float, steps: int) -> tuple[FlowBound, list[tuple[int, ...]]]:
+    """Steps without the best value and then with it; no bound on the way may exceed it."""
+    bound = flow_bound(case.graph, case.roadmap, objective=objective, **case.arguments())
+    found: list[tuple[int, ...]] = []
+    for step in range(2 * steps):
+        found.extend(tuple(walk.tolist()) for walk in bound.step())
+        assert bound.lower_bound <= best + 1e-9 * max(1, abs(best))
+        if step >= steps:
+            bound.prune(best)
+    return bound, found
+
+
+@pytest.mark.parametrize("objective", OBJECTIVES)
+@pytest.mark.parametrize("seed", WITH_WALKS)
+def test_no_walk_is_better_than_the_bound(seed, objective):
+    """All walks are enumerated: any noise, closure rule, walls, ends, costs."""
+    case = random_case(seed)
+    walks = case.walks()
+    assert len(walks) > 1
+    values = case.values(objective, walks)
+    _, found = _run(case, objective, float(values.min()), 5)
+    known = {tuple(walk.tolist()): value for walk, value in zip(walks, values, strict=True)}
+    assert all(walk in known for walk in found)
+    assert min(known[walk] for walk in found) <= values.min() + 0.1 * np.ptp(values)
+
+
+def test_the_bound_meets_the_best_value():
+    """Splitting ends with the best walk alone."""
+    case = random_case(52)
+    walks = case.walks()
+    for objective in ("error", "map"):
+        values = case.values(objective, walks)
+        bound, _ = _run(case, objective, float(values.min()), 30)
+        assert bound.lower_bound >= values.min() - 0.05 * np.ptp(values)
+        assert bound.share_ruled_out > 0.5
+
+
+def test_bound_never_falls():
+    case = random_case(85)
+    bound = flow_bound(case.graph, case.roadmap, objective="map", **case.arguments())
+    assert bound.lower_bound == -math.inf
+    before = -math.inf
+    for _ in range(6):
+        bound.step()
+        assert bound.lower_bound >= before
+        before = bound.lower_bound
+    bound.prune(before - 5.0)
+    assert bound.lower_bound == before
+
+
+def test_driven_in_three_dimensions():
+    """A planar graph in SE(3): the bound covers its walks too."""
+    case = random_case(85)
+    graph = case.graph
+    zero = np.zeros(graph.num_poses)
+    half = graph.poses[:, 2] / 2
+    poses = np.column_stack([graph.positions, zero, zero, zero, np.sin(half), np.cos(half)])
+    root = np.random.default_rng(0).normal(size=(6, 6)) + 4 * np.eye(6)
+    information = 20 * root @ root.T
+    spatial = tb.PoseGraph(poses, graph.edges, None, (information + information.T) / 2)
+    case = Case(
+        spatial, case.roadmap, case.world, case.goal, case.max_length, case.spacing, spatial.information[0], case.rule,
+        case.return_to_start, case.cost_per_metre,
+    )  # fmt: skip
+    walks = case.walks()
+    for objective in OBJECTIVES:
+        _run(case, objective, float(case.values(objective, walks).min()), 3)
+
+
+def test_costs_of_edges():
+    """An edge that costs more than anything can gain is on no walk that is found."""
+    case = random_case(85)
+    walks = case.walks()
+    used = {tuple(sorted(pair)) for walk in walks for pair in zip(walk[:-1].tolist(), walk[1:].tolist(), strict=True)}
+    avoidable = next(
+        edge
+        for edge in sorted(used)
+        if any(edge not in {tuple(sorted(p)) for p in zip(w[:-1].tolist(), w[1:].tolist(), strict=True)} for w in walks)
+    )
+    costs = np.where((case.roadmap.edges == avoidable).all(axis=1), 1e4, 0.0)
+    bound = flow_bound(case.graph, case.roadmap, objective="map", edge_costs=costs, **case.arguments())
+    last = [bound.step() for _ in range(5)][-1]
+    assert last
+    assert all(avoidable not in {tuple(sorted(p)) for p in zip(w[:-1].tolist(), w[1:].tolist(), strict=True)} for w in last)
+
+
+def test_says_what_is_wrong():
+    case = random_case(70)
+    arguments = case.arguments() | {"goal": 1, "return_to_start": False, "max_length": 0.01}
+    with pytest.raises(tb.TopobeliefError, match="that of the shortest path"):
+        flow_bound(case.graph, case.roadmap, objective="map", **arguments)
+    with pytest.raises(tb.TopobeliefError, match='expected objective to be one of "error"'):
+        flow_bound(case.graph, case.roadmap, objective="best", **case.arguments())
+    with pytest.raises(tb.TopobeliefError, match="expected a cost of at least 0"):
+        flow_bound(case.graph, case.roadmap, objective="map", **case.arguments() | {"cost_per_metre": -1.0})
