@@ -6,10 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from references import alignment_reference
 from topobelief.arrays import FloatArray
 from topobelief.bounds.options import BoundOptions
 from topobelief.forms.of_graph import GraphForms
 from topobelief.forms.protocol import ClosureForms
+from topobelief.graph.alignment import sample_of
 from topobelief.graph.fisher import fisher_rows
 from topobelief.linalg import laplacian_form
 from topobelief.linalg.estimate import Estimate
@@ -44,8 +46,10 @@ class Judge:
         return Judge(self.engine.extended(graph, anchor), self.criteria)
 
 
-def judge(graph, kind=IncrementalEngine, *, anchor=None, determinant="cholesky", window=2, **criteria) -> Judge:
-    engine = kind(graph, graph.num_poses - 1 if anchor is None else anchor)
+def judge(
+    graph, kind=IncrementalEngine, *, anchor=None, determinant="cholesky", window=2, sample_size=500, **criteria
+) -> Judge:
+    engine = kind(graph, graph.num_poses - 1 if anchor is None else anchor, sample_size=sample_size)
     return Judge(engine, Criteria(options=BoundOptions(determinant, window), **criteria))
 
 
@@ -69,7 +73,7 @@ class DenseForms(GraphForms, ClosureForms[float]):
 
     def __init__(self, engine: DenseEngine, action) -> None:
         alone = engine.from_scratch(action)
-        super().__init__(alone.graph, anchor=engine.anchor, prior=engine.graph)
+        super().__init__(alone.graph, anchor=engine.anchor, prior=engine.graph, sample_size=engine.sample_size)
         n, m = engine.graph.num_poses, engine.graph.num_edges
         batch = Extensions.of(n, action.edges, np.array([0, len(action.edges)]), np.array([0, action.num_new_poses]))
         rank = np.concatenate([np.zeros(n), 1 + np.argsort(batch.order)])  # along the path; 0 for poses that exist
@@ -114,6 +118,37 @@ class DenseForms(GraphForms, ClosureForms[float]):
     @property
     def increments(self):
         return self
+
+    def solved(self, name, columns):
+        """M^-1 C, zero at the pose that is held."""
+        rows = self.rows(name, self.anchor)
+        free = np.delete(columns, self.anchor, axis=0)
+        found = np.linalg.solve(np.einsum("mrx,mry->xy", rows, rows), free.reshape(rows.shape[2], -1))
+        return np.insert(found.reshape(free.shape), self.anchor, 0, axis=0)
+
+    def mean_resistance(self):
+        nodes = sample_of(self.num_existing, self._sample_size)
+        columns = np.zeros((self.graph.num_poses, 1, len(nodes)))
+        columns[nodes, 0] = np.eye(len(nodes)) - 1 / len(nodes)
+        return Estimate(float(np.sum(columns * self.solved("trees_p", columns))) / len(nodes), 0.0)
+
+    def projection(self, b):
+        nodes, k = sample_of(self.num_existing, self._sample_size), self.split[0]
+        columns = np.zeros((self.graph.num_poses, b, len(nodes) * k))
+        columns[nodes, :k] = alignment_reference(self._prior.positions[nodes]).reshape(len(nodes), k, -1)
+        return columns, len(nodes)
+
+    def aligned_trace(self, form):
+        columns, count = self.projection(self.split[0] if form == "positions" else self.tangent_dim)
+        return Estimate(float(np.sum(columns * self.solved(form, columns))) / count, 0.0)
+
+    def coupled_trace(self, rotations):
+        k = self.split[0]
+        columns, count = self.projection(k)
+        rows = self.rows("joint", [])
+        rows = rows.reshape(-1, self.graph.num_poses, self.tangent_dim)
+        moved = np.einsum("xnr,xmp,mps->nrs", rows[:, :, k:], rows[:, :, :k], self.solved("positions", columns), optimize=True)
+        return Estimate(float(np.sum(moved * self.solved(rotations, moved))) / count, 0.0)
 
 
 def dense(matrix) -> Estimate[float]:

@@ -10,16 +10,21 @@ import numpy as np
 
 from topobelief.arrays import FloatArray
 from topobelief.forms.action_batch import ActionBatch
-from topobelief.forms.prior_factors import PriorFactors, form_of
-from topobelief.forms.protocol import ClosureForms, FormName, Forms, Part, Rows
+from topobelief.forms.prior_factors import PriorFactors, SolvedName, form_of
+from topobelief.forms.protocol import ClosureForms, FormName, Forms, Part, PositionsName, RotationsName, Rows
 from topobelief.graph.action import posterior
 from topobelief.graph.topology import Topology
-from topobelief.linalg.estimate import Estimate
+from topobelief.linalg.elimination_paths import FormFactor
+from topobelief.linalg.estimate import UNIT_ROUNDOFF, Estimate
 from topobelief.linalg.increments import Increments, Wanted, diagonal_increments, log_det_increments
 
 _LARGEST_ERROR = 1.0  # nats; a factor that knows less is none
 _QR_SIZE = 1200  # up to here an evaluation from scratch may do better, by QR, than a factor
 _QR_ERROR = 1e-3  # nats; only beyond it is that worth its time
+_QR_RELATIVE_ERROR = 1e-8  # of a trace; the same
+_LARGEST_RELATIVE_ERROR = 0.02
+_GAIN_ERRORS = 3.0  # I + R enters once, what is seen of the solutions twice
+_OPERATIONS = 64
 
 
 class IncrementalForms(Forms[FloatArray], ClosureForms[FloatArray]):
@@ -37,6 +42,7 @@ class IncrementalForms(Forms[FloatArray], ClosureForms[FloatArray]):
     def __init__(self, prior: PriorFactors, batch: ActionBatch) -> None:
         self._prior, self._batch = prior, batch
         self._known: dict[tuple[FormName, float, Wanted], Increments] = {}
+        self._traced: dict[SolvedName, Increments] = {}
 
     @property
     def tangent_dim(self) -> int:
@@ -114,6 +120,35 @@ class IncrementalForms(Forms[FloatArray], ClosureForms[FloatArray]):
         """Not by increments: an action changes D and so N at the poses that it touches."""
         return Estimate(np.full(self._batch.count, np.nan), np.full(self._batch.count, np.inf))
 
+    def mean_resistance(self) -> Estimate[FloatArray]:
+        return self._trace("trees_p")
+
+    def aligned_trace(self, form: PositionsName) -> Estimate[FloatArray]:
+        return self._trace(form)
+
+    def coupled_trace(self, rotations: RotationsName) -> Estimate[FloatArray]:
+        """Not by increments: an action changes N everywhere, and `aligned_trace` of the joint form costs less."""
+        return Estimate(np.full(self._batch.count, np.nan), np.full(self._batch.count, np.inf))
+
+    def knows_trace(self, form: PositionsName) -> bool:
+        return form in self._traced
+
+    def _trace(self, name: SolvedName) -> Estimate[FloatArray]:
+        """The prior's trace less what closures gain. Both are known relative to the errors of M and of I + R."""
+        prior, trusted, factor = self._prior.solutions(name), self._trusted(name, 0.0), self._prior.factor(name, 0.0)
+        if name not in self._traced:
+            self._traced[name] = log_det_increments(
+                factor, self._batch.extensions, form_of(name, self._batch), solutions=prior.values
+            )
+            self._known.setdefault((name, 0.0, "closures"), self._traced[name])
+        added, trace = self._traced[name], prior.trace
+        relative = trusted.error + _GAIN_ERRORS * added.error + _OPERATIONS * UNIT_ROUNDOFF
+        value = trace.value - added.gains
+        error = np.where(added.gains == 0, trace.error, relative * (trace.value + added.gains))
+        limit = _QR_RELATIVE_ERROR if _is_small(factor) else _LARGEST_RELATIVE_ERROR
+        known = math.isfinite(trusted.value) & (error <= limit * value)
+        return 1 / self._prior.alignment.count * Estimate(np.where(known, value, np.nan), error)
+
     @property
     def increments(self) -> IncrementalForms:
         return self
@@ -155,8 +190,7 @@ class IncrementalForms(Forms[FloatArray], ClosureForms[FloatArray]):
         """ln det M of the prior with the error that all actions have in common; nan where that is too large."""
         factor = self._prior.factor(form, shift)
         value, error = factor.log_det.value, 2 * factor.log_det.error
-        small = factor.tree.num_free * factor.block_size <= _QR_SIZE
-        limit = _QR_ERROR if small else _LARGEST_ERROR
+        limit = _QR_ERROR if _is_small(factor) else _LARGEST_ERROR
         return Estimate(value if error <= limit else math.nan, error)
 
     def _increments(self, form: FormName, shift: float, wanted: Wanted = "closures") -> Increments:
@@ -186,3 +220,7 @@ class IncrementalForms(Forms[FloatArray], ClosureForms[FloatArray]):
     def _known_of(self, form: FormName) -> Increments | None:
         """Any computation of a form so far."""
         return next((added for (name, shift, _), added in self._known.items() if name == form and not shift), None)
+
+
+def _is_small(factor: FormFactor) -> bool:
+    return factor.tree.num_free * factor.block_size <= _QR_SIZE

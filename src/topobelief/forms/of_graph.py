@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from topobelief.arrays import FloatArray
-from topobelief.forms.of_topology import mean_log_noise, weights_of
-from topobelief.forms.protocol import FormName, Forms, Part
+from topobelief.forms.of_topology import mean_log_noise, mean_resistance, weights_of
+from topobelief.forms.protocol import FormName, Forms, Part, PositionsName, RotationsName
+from topobelief.graph.alignment import DEFAULT_SAMPLE_SIZE, Alignment, sample_of
 from topobelief.graph.fisher import FisherRows, fisher_rows
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.graph.topology import Topology
 from topobelief.linalg import EdgeForm, Estimate, LogDetSolver, laplacian_form
-from topobelief.linalg.shear import sheared_log_det
+from topobelief.linalg.inverse import InverseSolver, Solutions
+from topobelief.linalg.shear import moved_rotations, sheared_log_det
+
+_RATIO_SAFETY = 4.0  # the directions that were looked at may not contain the worst one
 
 
 class GraphForms(Forms[float]):
@@ -30,15 +36,24 @@ class GraphForms(Forms[float]):
         The graph before the action, whose poses and edges come first. Default: the graph itself.
     prior_rows
         Its whitened rows, where they are known.
+    sample_size
+        Over how many of its poses traces are taken at most.
     """
 
     def __init__(
-        self, graph: PoseGraph, *, anchor: int, prior: PoseGraph | None = None, prior_rows: FisherRows | None = None
+        self,
+        graph: PoseGraph,
+        *,
+        anchor: int,
+        prior: PoseGraph | None = None,
+        prior_rows: FisherRows | None = None,
+        sample_size: int = DEFAULT_SAMPLE_SIZE,
     ) -> None:
-        self.graph, self.anchor = graph, anchor
+        self.graph, self.anchor, self._sample_size = graph, anchor, sample_size
         self._prior, self._prior_rows = graph if prior is None else prior, prior_rows
         self._solvers: dict[int, LogDetSolver] = {}
         self._known: dict[tuple[FormName, float, Part], Estimate[float]] = {}
+        self._solved: dict[PositionsName, tuple[FloatArray, Solutions]] = {}
 
     @property
     def tangent_dim(self) -> int:
@@ -85,8 +100,45 @@ class GraphForms(Forms[float]):
     def sheared_rotations(self, step: float, *, hadamard: bool) -> Estimate[float]:
         return sheared_log_det(self._rows.joint(), self.split[0], self.graph.num_poses, self.anchor, step, hadamard=hadamard)
 
+    def mean_resistance(self) -> Estimate[float]:
+        laplacian = self._form("trees_p", self._rows)
+        return mean_resistance(laplacian, self.graph.num_poses, sample_of(self.num_existing, self._sample_size))
+
+    def aligned_trace(self, form: PositionsName) -> Estimate[float]:
+        return 1 / self._alignment.count * self._solutions(form)[1].trace
+
+    def coupled_trace(self, rotations: RotationsName) -> Estimate[float]:
+        """Errors: that of K by itself; that of I_pp moves N^T Pi by up to sqrt(c) times as much, c the largest ratio seen."""
+        columns, along = self._solutions("positions")
+        moved = moved_rotations(self._rows.joint(), self.split[0], along.values)
+        solver = InverseSolver(self.graph.edges, self.graph.num_poses, self.anchor)
+        found = solver.solve(_blocks(self._rows, rotations), moved)
+        before, added = (np.sum(z * a, axis=(0, 1)) for z, a in ((along.values, columns), (found.values, moved)))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = 1.0 + _RATIO_SAFETY * float(np.max(added / before, initial=0.0, where=before > 0))
+        trace = found.trace
+        error = trace.error + 2 * along.relative_error * math.sqrt(max(0.0, ratio * along.trace.value * trace.value))
+        return 1 / self._alignment.count * Estimate(trace.value, error)
+
     def knows(self, form: FormName) -> bool:
         return (form, 0.0, "all") in self._known
+
+    def knows_trace(self, form: PositionsName) -> bool:
+        return form in self._solved
+
+    def _solutions(self, name: PositionsName) -> tuple[FloatArray, Solutions]:
+        """Columns Pi on all poses, and what M^-1 makes of them."""
+        if name not in self._solved:
+            form = _blocks(self._rows, name)
+            columns = np.zeros((self.graph.num_poses, form.block_size, self._alignment.count * self.split[0]))
+            columns[self._alignment.nodes] = self._alignment.columns(form.block_size)
+            solver = InverseSolver(self.graph.edges, self.graph.num_poses, form.strongest_node())
+            self._solved[name] = columns, solver.solve(form, columns)
+        return self._solved[name]
+
+    @cached_property
+    def _alignment(self) -> Alignment:
+        return Alignment.of(self._prior.positions, self._sample_size)
 
     @property
     def increments(self) -> None:
@@ -128,3 +180,8 @@ class GraphForms(Forms[float]):
             return fisher_rows(self.graph)
         prior = fisher_rows(self._prior) if self._prior_rows is None else self._prior_rows
         return prior.joined(self._new_rows)
+
+
+def _blocks(rows: FisherRows, name: PositionsName | RotationsName) -> EdgeForm:
+    """A form in blocks of all variables of a pose, whatever the noise."""
+    return getattr(replace(rows, weights=None), name)()

@@ -6,11 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from topobelief.arrays import FloatArray
+from topobelief.arrays import FloatArray, IntArray
 from topobelief.forms.protocol import Part, TreeForms, TreeName
+from topobelief.graph.alignment import DEFAULT_SAMPLE_SIZE, centring, sample_of
 from topobelief.graph.information import isotropic_weights, scalar_weights
 from topobelief.graph.topology import Topology
-from topobelief.linalg import Estimate, LogDetSolver, laplacian_form
+from topobelief.linalg import EdgeForm, Estimate, LogDetSolver, laplacian_form
+from topobelief.linalg.inverse import InverseSolver
 
 
 class TopologyForms(TreeForms[float]):
@@ -21,9 +23,22 @@ class TopologyForms(TreeForms[float]):
     topology
         Connected.
     information : shape (num_edges, kappa, kappa)
+    existing
+        Nodes, the first ones, that existed before an action. Default: all.
+    sample_size
+        How many of them traces are taken over at most.
     """
 
-    def __init__(self, topology: Topology, information: FloatArray) -> None:
+    def __init__(
+        self,
+        topology: Topology,
+        information: FloatArray,
+        *,
+        existing: int | None = None,
+        sample_size: int = DEFAULT_SAMPLE_SIZE,
+    ) -> None:
+        self._existing = topology.num_nodes if existing is None else existing
+        self._sample_size = sample_size
         self._topology, self._information, self._weights = topology, information, weights_of(information)
         self._solver = LogDetSolver(topology.edges, topology.num_nodes, 0)
 
@@ -33,11 +48,11 @@ class TopologyForms(TreeForms[float]):
 
     @property
     def num_existing(self) -> int:
-        return self._topology.num_nodes
+        return self._existing
 
     @property
     def num_new(self) -> float:
-        return 0.0
+        return float(self._topology.num_nodes - self._existing)
 
     def of_topology(self, quantity: Callable[[Topology], float]) -> float:
         return quantity(self._topology)
@@ -53,10 +68,23 @@ class TopologyForms(TreeForms[float]):
         return self._weights
 
     def log_det(self, form: TreeName, *, shift: float = 0.0, part: Part = "all") -> Estimate[float]:
-        if part == "new":
-            return Estimate(0.0, 0.0)
         rows = laplacian_form(self._topology.edges, self.weights[form == "trees_r"])
+        if part == "new":
+            held = np.arange(self._existing)
+            return LogDetSolver(self._topology.edges, self._topology.num_nodes, held).log_det(rows)
         return self._solver.log_det(rows, shift=shift)
+
+    def mean_resistance(self) -> Estimate[float]:
+        rows = laplacian_form(self._topology.edges, self.weights[0])
+        return mean_resistance(rows, self._topology.num_nodes, sample_of(self._existing, self._sample_size))
+
+
+def mean_resistance(laplacian: EdgeForm, num_nodes: int, sample: IntArray) -> Estimate[float]:
+    """1/|S| tr(Pi_n L^-1 Pi_n) over a sample S of the nodes, from scratch."""
+    columns = np.zeros((num_nodes, 1, len(sample)))
+    columns[sample, 0] = centring(len(sample))
+    solver = InverseSolver(laplacian.edges, num_nodes, laplacian.strongest_node())
+    return 1 / len(sample) * solver.solve(laplacian, columns).trace
 
 
 def weights_of(information: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -12,12 +13,17 @@ from topobelief.arrays import FloatArray, IntArray
 from topobelief.forms.action_batch import ActionBatch
 from topobelief.forms.degree_sums import DegreeSums
 from topobelief.forms.of_topology import weights_of
-from topobelief.forms.protocol import FormName
+from topobelief.forms.protocol import FormName, PositionsName
+from topobelief.graph.alignment import DEFAULT_SAMPLE_SIZE, Alignment, centring
 from topobelief.graph.fisher import FisherRows, fisher_rows
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg import EdgeForm, Estimate, LogDetSolver, laplacian_form
 from topobelief.linalg.elimination_paths import FormFactor, KnownColumns, changed_nodes
 from topobelief.linalg.elimination_tree import EliminationTree
+from topobelief.linalg.inverse import Solutions
+from topobelief.linalg.solutions import solutions
+
+SolvedName = Literal["trees_p"] | PositionsName
 
 _HOLD_STRONGEST_ERROR = 1e-6  # nats; below it one more factorisation would not be seen
 _STRONG_ROWS_ERROR = 1e-4  # nats; beyond it one more factorisation with strong rows last is worth its time
@@ -35,10 +41,20 @@ class PriorFactors:
         The pose that all forms hold.
     earlier
         Those of the graph before it grew, whose orders are kept and from whose factors columns that are still right are copied.
+    sample_size
+        Over how many poses traces are taken at most.
     """
 
-    def __init__(self, graph: PoseGraph, anchor: int, *, earlier: PriorFactors | None = None) -> None:
-        self.graph, self.anchor = graph, anchor
+    def __init__(
+        self,
+        graph: PoseGraph,
+        anchor: int,
+        *,
+        earlier: PriorFactors | None = None,
+        sample_size: int = DEFAULT_SAMPLE_SIZE,
+    ) -> None:
+        self.graph, self.anchor, self.sample_size = graph, anchor, sample_size
+        self._solutions: dict[FormName, Solutions] = {}
         self._trees: dict[int, EliminationTree] = {}
         self._bases: dict[int, EliminationTree] = {}  # of the trees that keep an order
         self._factors: dict[tuple[FormName, float], FormFactor] = {}
@@ -48,7 +64,7 @@ class PriorFactors:
     def _without_earlier(self) -> PriorFactors:
         """The same without those that they came from, so that a graph that grows again and again does not keep them all."""
         alone = copy(self)
-        alone._earlier = None
+        alone._earlier, alone._solutions = None, {}
         return alone
 
     @property
@@ -117,6 +133,22 @@ class PriorFactors:
             return None
         changed = changed_nodes(form_of(name, self._earlier), form, self.graph.num_poses, (old.tree.held, held))
         return KnownColumns(old, changed)
+
+    def solutions(self, name: SolvedName) -> Solutions:
+        """M^-1 C of the columns of a projection of positions: Pi, or Pi_n for trees, and tr(C^T M^-1 C)."""
+        if name not in self._solutions:
+            sample = self.alignment.nodes
+            if name == "trees_p":
+                columns = centring(len(sample))[:, None]
+            else:
+                columns = self.alignment.columns(form_of(name, self).block_size)
+            self._solutions[name] = solutions(self.factor(name, 0.0), sample, columns)
+        return self._solutions[name]
+
+    @cached_property
+    def alignment(self) -> Alignment:
+        """Pi of the sample of the prior's poses."""
+        return Alignment.of(self.graph.positions, self.sample_size)
 
     def hadamard(self, name: FormName, shift: float) -> Estimate[float]:
         """Sum of ln det of the diagonal blocks."""

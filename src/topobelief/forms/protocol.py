@@ -1,4 +1,4 @@
-"""What signatures, bounds and objectives are made of: log-determinants of the theory's forms, and counts.
+"""What signatures, bounds and objectives are made of: log-determinants of the theory's forms, traces of their inverses, counts.
 
 A form is a matrix M = sum over edges of R^T R with one anchored pose left out (docs, the mathematics, sections 2 to 5):
 
@@ -6,6 +6,13 @@ A form is a matrix M = sum over edges of R^T R with one anchored pose left out (
     positions, rotations        I_pp and I_rr, blocks of the information matrix
     rotations_given_positions   L_r|p, the Laplacian of the rotations with weights O_r|p
     joint                       I, the information matrix itself
+
+Traces of an inverse are taken over the positions of a sample S of the poses that existed before the action (all of them, up to
+a size), with a projection that takes out what moves all of them together (docs, the mathematics, section 12):
+
+    mean_resistance             1/|S| tr(Pi_n M^-1 Pi_n), M "trees_p", Pi_n takes out the mean: the same for whatever is held
+    aligned_trace               1/|S| tr(Pi M^-1 Pi), M "positions" or "joint", Pi takes out the best rigid alignment
+    coupled_trace               1/|S| tr(Pi N K^-1 N^T Pi), N = I_pp^-1 I_pr, K "rotations" or "rotations_given_positions"
 
 An engine supplies them after one action (numbers are floats) or after each of K actions at once (arrays of shape (K,), nan
 where it cannot). Formulas are written once, for both. Signatures see `TreeForms` only: topology and noise, no geometry.
@@ -26,6 +33,9 @@ from topobelief.linalg.estimate import Estimate, Number
 
 TreeName = Literal["trees_p", "trees_r"]
 FormName = Literal["trees_p", "trees_r", "positions", "rotations", "rotations_given_positions", "joint"]
+
+PositionsName = Literal["positions", "joint"]
+RotationsName = Literal["rotations", "rotations_given_positions"]
 
 Part = Literal["all", "new"]
 """The whole matrix, or the block of the new poses with all existing ones held."""
@@ -72,6 +82,10 @@ class TreeForms(ABC, Generic[Number]):
     @abstractmethod
     def log_det(self, form: TreeName, *, shift: float | Number = 0.0, part: Part = "all") -> Estimate[Number]:
         """ln det of a form plus `shift` times I."""
+
+    @abstractmethod
+    def mean_resistance(self) -> Estimate[Number]:
+        """1/|S| tr(Pi_n L^-1 Pi_n), L the Laplacian "trees_p": the sum of effective resistances between pairs of S / |S|^2."""
 
     @property
     def split(self) -> tuple[int, int]:
@@ -139,8 +153,20 @@ class Forms(TreeForms[Number]):
         With `hadamard`, the sum of ln det of the diagonal blocks of I_rr - 2 step (1 - step) I_rp D^-1 I_pr, which is larger.
         """
 
+    @abstractmethod
+    def aligned_trace(self, form: PositionsName) -> Estimate[Number]:
+        """1/|S| tr(Pi M^-1 Pi) over positions, m^2; "joint" is the squared expected error of the map."""
+
+    @abstractmethod
+    def coupled_trace(self, rotations: RotationsName) -> Estimate[Number]:
+        """1/|S| tr(Pi N K^-1 N^T Pi) with N = I_pp^-1 I_pr: what rotations of covariance K^-1 add to `aligned_trace`, m^2."""
+
     def knows(self, form: FormName) -> bool:
         """Whether `log_det` of a form has been computed along the way."""
+        return False
+
+    def knows_trace(self, form: PositionsName) -> bool:
+        """Whether `aligned_trace` of a form has been computed along the way."""
         return False
 
     @property

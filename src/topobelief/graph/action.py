@@ -34,7 +34,8 @@ class Action(ReadOnlyArrays):
     label
         What a person calls the action.
     cost
-        A deterministic cost (length, energy, time), in nats; it adds to the entropy and to its bounds.
+        A deterministic cost (length, energy, time) in the objective's unit, nats or metres of error; it adds to the objective
+        and to its bounds.
     length
         How far the robot drives, metres; it is told and has no influence. Default: from pose to pose (`driven_lengths`).
     probabilities : shape (c,), optional

@@ -31,6 +31,7 @@ def add_increments(
     path_of: IntArray,
     paths: Paths,
     split: int,
+    solutions: FloatArray,
     which: IntArray,
     out: FloatArray,
 ) -> None:
@@ -47,11 +48,13 @@ def add_increments(
     paths
     split
         Rows of a block that come first; 0 if the parts are not wanted.
+    solutions : shape (num_existing, b, s), or without columns
+        Z = M^-1 C for some columns C, whose trace tr(C^T M^-1 C) falls.
     which : shape (any,)
-    out : shape (K, 7)
+    out : shape (K, 8)
         ln det T of the forest; ln det (I + R) of the closures; the same with the existing nodes held; with the first rows of
-        each block alone; with the others alone; by the chain rule (`chain_kernels`); what their error is proportional to. Zero
-        on entry.
+        each block alone; with the others alone; by the chain rule (`chain_kernels`); what their error is proportional to; what
+        the trace loses. Zero on entry.
     """
     r, b = rows_i.shape[1], rows_i.shape[2]
     for k in which:
@@ -77,6 +80,7 @@ def add_increments(
             matrix[p, p] += 1.0
             out[k, 6] += matrix[p, p]
         out[k, 2] = cholesky_log_det(matrix.copy())
+        seen = seen_solutions(blocks, count, solutions)
         sizes = add_existing(blocks, count, path_of, paths, matrix)
         if split:
             out[k, 3] = cholesky_log_det(periodic_part(matrix, b, 0, split))
@@ -85,6 +89,54 @@ def add_increments(
         variances = inverse_diagonal(matrix)
         for p in range(count * b):
             out[k, 6] += variances[p] * sizes[p]
+        out[k, 7] = squared_norm_of_solution(matrix, seen)
+
+
+@compiled
+def seen_solutions(blocks: Blocks, count: int, solutions: FloatArray) -> FloatArray:
+    """W = A Z, A the blocks' rows on existing nodes, shape (count b, s)."""
+    _, b, num_columns = solutions.shape
+    seen = np.zeros((count * b, num_columns))
+    if num_columns == 0:
+        return seen
+    for q in range(count):
+        for side in range(2):
+            node = blocks.ends[q, side]
+            for c in range(b if node >= 0 else 0):
+                row = seen[q * b + c]
+                for d in range(b):
+                    factor, solution = blocks.rows[q, side, c, d], solutions[node, d]
+                    for m in range(num_columns):
+                        row[m] += factor * solution[m]
+    return seen
+
+
+@compiled
+def squared_norm_of_solution(factor: FloatArray, seen: FloatArray) -> float:
+    """|C^-1 W|^2 with C the lower triangle; W is overwritten, some columns at a time that fit into fast memory."""
+    size, num_columns, total = len(seen), seen.shape[1], 0.0
+    for start in range(0, num_columns, 256):
+        stop = min(start + 256, num_columns)
+        for p in range(size):
+            row, q = seen[p, start:stop], 0
+            while q + 3 < p:
+                u, v, w, x = factor[p, q], factor[p, q + 1], factor[p, q + 2], factor[p, q + 3]
+                a, b = seen[q, start:stop], seen[q + 1, start:stop]
+                c, d = seen[q + 2, start:stop], seen[q + 3, start:stop]
+                for m in range(stop - start):
+                    row[m] -= u * a[m] + v * b[m] + w * c[m] + x * d[m]
+                q += 4
+            while q < p:
+                u, a = factor[p, q], seen[q, start:stop]
+                for m in range(stop - start):
+                    row[m] -= u * a[m]
+                q += 1
+            scale, squares = 1.0 / factor[p, p], 0.0
+            for m in range(stop - start):
+                row[m] *= scale
+                squares += row[m] * row[m]
+            total += squares
+    return total
 
 
 @compiled

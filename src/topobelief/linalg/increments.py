@@ -10,6 +10,8 @@ increments, never differences of two large numbers; entries of M^-1 come from pa
 nodes held, ln det T + ln det (I + V V^T) is left, the block of the new nodes. Edges with more rows than variables are brought
 to square rows; what is left over stands on a new node alone where there is one, and costs nothing.
 
+A trace tr(C^T M^-1 C) falls by |L^-1 A Z|^2, where L L^T = I + R and Z = M^-1 C is known at the existing nodes.
+
 Errors, beyond those of M (see `elimination_paths`), in units of roundoff times the roundings behind a number: R is off by E
 with |E_pq| <= sqrt(S_p S_q), S the diagonal that R would have if no terms cancelled, and ln det (I + R) by tr((I + R)^-1 E),
 about the sum of ((I + R)^-1)_pp S_p; ln det T by the condition numbers of the triangles whose product it is.
@@ -52,6 +54,8 @@ class Increments:
         ln det (I + V V^T): existing nodes held.
     first_rows, other_rows : shape (K,)
         ln det (I + R) of the first rows of each closure alone, and of the others.
+    gains : shape (K,)
+        By how much tr(C^T M^-1 C) falls, C the columns to which solutions Z = M^-1 C were given.
     chained : shape (K,)
         Sum over the closures, in the order of the path, of ln det of their conditional covariance given those of a window.
     error : shape (K,)
@@ -66,6 +70,7 @@ class Increments:
     first_rows: FloatArray
     other_rows: FloatArray
     chained: FloatArray
+    gains: FloatArray
     error: FloatArray
 
 
@@ -82,6 +87,7 @@ def log_det_increments(
     shift: float = 0.0,
     wanted: Wanted = "closures",
     first_rows: int = 0,
+    solutions: FloatArray | None = None,
 ) -> Increments:
     """Increments of ln det M by each extension.
 
@@ -98,8 +104,11 @@ def log_det_increments(
         For parts and a window, rows are square and no row of a closure but the first ones touches variables of their number.
     first_rows
         How many of a closure's rows come first.
+    solutions : shape (num_existing, b, s), optional
+        Z, where gains are wanted; not for a window.
     """
-    out = np.zeros((extensions.num_extensions, 7))
+    out = np.zeros((extensions.num_extensions, 8))
+    columns = np.zeros((0, form.block_size, 0)) if solutions is None else solutions
     rows_i, rows_j = np.ascontiguousarray(form.rows_i), np.ascontiguousarray(form.rows_j)
     path_of = np.full(extensions.num_existing, -1)
 
@@ -112,22 +121,22 @@ def log_det_increments(
                 add_chained_increments(extensions, rows_i, rows_j, path_of, paths, first_rows, wanted, part, out)
             else:
                 split = first_rows if wanted == "parts" else 0
-                add_increments(extensions, rows_i, rows_j, shift, path_of, paths, split, part, out)
+                add_increments(extensions, rows_i, rows_j, shift, path_of, paths, split, columns, part, out)
 
         parts = min(len(which), _PARTS_PER_THREAD * num_threads()) if len(extensions.edges) >= _LEAST_EDGES else 1
         in_parallel(add, np.linspace(0, len(which), parts + 1).astype(int).tolist())
 
     for which in [np.arange(extensions.num_extensions)] if factor is None else _groups(factor, extensions):
         add_group(which)
-    forest, closures, held, first, others, chained, size = np.ascontiguousarray(out.T)
+    forest, closures, held, first, others, chained, size, gains = np.ascontiguousarray(out.T)
     error = UNIT_ROUNDOFF * (_OPERATIONS * size + np.abs(forest) + np.abs(closures) + np.abs(chained))
     error += _root_errors(form, extensions)
     unknown = np.full(extensions.num_extensions, np.nan)
     if isinstance(wanted, int):
-        return Increments(forest, unknown, unknown, unknown, others, chained, error)
+        return Increments(forest, unknown, unknown, unknown, others, chained, unknown, error)
     if wanted == "closures":
         first = others = unknown
-    return Increments(forest, closures, held, first, others, unknown, error)
+    return Increments(forest, closures, held, first, others, unknown, unknown if solutions is None else gains, error)
 
 
 @_may_overflow

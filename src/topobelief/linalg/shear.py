@@ -67,7 +67,16 @@ def sheared_log_det(
     return _gram_log_det(moved, magnitude, b - first, form.root_error)
 
 
-def _sparse_rows(form: EdgeForm, num_nodes: int, held: int) -> sparse.csc_array:
+def moved_rotations(form: EdgeForm, first: int, positions: FloatArray) -> FloatArray:
+    """M_rp X, shape (num_nodes, b - first, s), for displacements X of the first part, shape (num_nodes, first, s)."""
+    num_nodes, _, count = positions.shape
+    rows = _sparse_rows(form, num_nodes)
+    variable = np.arange(rows.shape[1]) % form.block_size
+    residuals = rows[:, variable < first] @ positions.reshape(num_nodes * first, count)
+    return np.asarray(rows[:, variable >= first].T @ residuals, dtype=np.float64).reshape(num_nodes, -1, count)
+
+
+def _sparse_rows(form: EdgeForm, num_nodes: int, held: int | None = None) -> sparse.csc_array:
     """All rows on the variables of the free nodes."""
     m, r, b = form.rows_i.shape
     variables: IntArray = b * form.edges.T[:, :, None, None] + np.arange(b, dtype=np.int64)  # ends, edges, 1, b

@@ -5,11 +5,11 @@ from __future__ import annotations
 from topobelief.entropy import entropy_of
 from topobelief.forms.protocol import Forms, TreeForms
 from topobelief.linalg.estimate import Estimate, Number
-from topobelief.objectives.objective import Objective
+from topobelief.objectives.objective import Entropy
 from topobelief.signatures.spanning_trees import joint_signature
 
 
-class JointEntropy(Objective):
+class JointEntropy(Entropy):
     """J = (n - 1) kappa / 2 ln(2 pi e) - 1/2 ln det I, n the poses after the action, kappa the tangent dimension; nats."""
 
     def of(self, log_det: Estimate[Number], forms: Forms[Number]) -> Estimate[Number]:

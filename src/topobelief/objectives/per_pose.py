@@ -5,10 +5,10 @@ from __future__ import annotations
 from topobelief.forms.protocol import Forms, TreeForms
 from topobelief.linalg.estimate import Estimate, Number
 from topobelief.objectives import joint
-from topobelief.objectives.objective import Objective
+from topobelief.objectives.objective import Entropy
 
 
-class EntropyPerPose(Objective):
+class EntropyPerPose(Entropy):
     """J / (n - 1), n the poses after the action; nats per pose."""
 
     def of(self, log_det: Estimate[Number], forms: Forms[Number]) -> Estimate[Number]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -18,7 +18,7 @@ from topobelief.graph.action import Action
 from topobelief.linalg.estimate import Estimate
 from topobelief.objectives.objective import Objective
 from topobelief.planning.engine import Engine
-from topobelief.planning.registry import BOUNDS, OBJECTIVES, SIGNATURES, chosen
+from topobelief.planning.registry import FAMILIES, OBJECTIVES, SIGNATURE_UNITS, SIGNATURES, chosen
 from topobelief.signatures.options import SignatureOptions
 
 _may_overflow = np.errstate(over="ignore", divide="ignore", invalid="ignore")  # what is not finite is refused
@@ -38,6 +38,21 @@ class Criteria:
     def objective_itself(self) -> Objective:
         """What the objective's name stands for."""
         return chosen(OBJECTIVES, self.objective)
+
+    @property
+    def families(self) -> Mapping[str, str]:
+        """Families of bounds that the objective has, each with its place."""
+        return FAMILIES[self.objective_itself.argument]
+
+    @property
+    def signature_estimates_objective(self) -> bool:
+        """Whether the signature has the objective's unit, so that costs can be taken from it."""
+        return SIGNATURE_UNITS.get(self.signature) == self.objective_itself.unit
+
+    @property
+    def needs_inverses(self) -> bool:
+        """Whether the objective or the signature is a trace of an inverse: from scratch, hundreds of solutions an action."""
+        return "m" in (self.objective_itself.unit, SIGNATURE_UNITS.get(self.signature))
 
 
 class Batch:
@@ -75,7 +90,7 @@ class Batch:
         IllConditionedError
             Names the first action of which double precision cannot give a bound.
         """
-        family, options = chosen(BOUNDS, self._criteria.bounds), self._criteria.options
+        family, options = chosen(self._criteria.families, self._criteria.bounds), self._criteria.options
 
         def widened(forms: Forms[Any]) -> tuple[Any, Any]:
             lower, upper = self._criteria.objective_itself.bounds(family, options, forms)
@@ -107,7 +122,7 @@ class Batch:
     @property
     def knows_entropies(self) -> bool:
         """Whether exact values cost nothing more, since bounds took the same increments."""
-        return all(forms.knows("joint") for _, forms in self._groups)
+        return all(self._criteria.objective_itself.known(forms) for _, forms in self._groups)
 
     @cached_property
     def _exact(self) -> Estimate[FloatArray]:
@@ -136,7 +151,8 @@ class Batch:
             return quantity(forms)
         except IllConditionedError as error:
             label = f" ({self._actions[place].label!r})" if self._actions[place].label else ""
-            raise IllConditionedError(f"action {self._numbers[place]}{label}: {error.what}", error.error_estimate) from None
+            what = f"action {self._numbers[place]}{label}: {error.what}"
+            raise IllConditionedError(what, error.error_estimate, unit=error.unit) from None
 
 
 def _pair(estimate: Estimate[Any]) -> tuple[Any, Any]:

@@ -20,6 +20,7 @@ _CHOICES: tuple[dict[str, Any], ...] = (
     {"bounds": "fischer"},
     {"bounds": "anchored"},
     {"bounds": "chain"},
+    {"objective": "error", "signature": "resistance"},
     {"signature": "von_neumann_approx", "determinant": "hadamard"},
 )
 
@@ -32,7 +33,8 @@ def compile_kernels() -> None:
             grown = posterior(graph, action)
             revisit = Action(grown.poses[:0], action.edges[:1], action.information[0])
             for choice in _CHOICES:
-                planner = Planner(graph, objective="map", engine="incremental", anchor=0, **choice)
+                choices: dict[str, Any] = {"objective": "map", "engine": "incremental", "anchor": 0, **choice}
+                planner = Planner(graph, **choices)
                 _evaluate(planner, action)
                 _evaluate(planner.extended(grown), revisit)
 

@@ -19,6 +19,7 @@ _SIGNATURE_NAMES = {
     "spanning_trees": "spanning trees",
     "von_neumann": "von Neumann entropy",
     "von_neumann_approx": "von Neumann entropy by degrees",
+    "resistance": "effective resistance",
 }
 
 
@@ -30,7 +31,7 @@ class Candidate:
     num_new_poses: int
     num_closures: int
     length: float  # metres, of the path that the robot drives
-    cost: float  # nats
+    cost: float  # in the objective's unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,18 +43,19 @@ class Decision(ReadOnlyArrays):
     best : int
         The chosen action: the first of the ranking, or the one of least J once evaluated.
     ranking : shape (K,), int
-        All K actions, best signature first (signature - cost for spanning trees), compared to 32 binary digits; ties by index.
+        All K actions, best signature first (signature - cost where the signature has the objective's unit: spanning trees for
+        entropies, resistance for the expected error), compared to 32 binary digits; ties by index.
     signatures : shape (K,)
         Raw signatures.
     lower, upper : shape (K,)
-        Bounds of the objective plus cost, nats, widened by their rounding errors; after an exact evaluation both are that
+        Bounds of the objective plus cost, in `unit`, widened by their rounding errors; after an exact evaluation both are that
         value widened by its error. nan where not computed.
     entropies : shape (K,)
         Exact objective, cost excluded; nan where not evaluated.
     survivors : shape (number of survivors,), int
         Actions that may still be optimal, in ranking order; the first of the ranking is always among them.
     error_bound : float
-        No action is better than the best by more than this, nats; inf where no bounds were asked for.
+        No action is better than the best by more than this, in `unit`; inf where no bounds were asked for.
     margin_met : bool or None
         Whether the upper bound of the best lies below the margin; None where no margin was given.
     num_evaluations : int
@@ -62,6 +64,8 @@ class Decision(ReadOnlyArrays):
     candidates : tuple of Candidate
     objective, signature, bounds, determinant : str
         As given to the planner.
+    unit : str
+        Of the objective, its bounds, costs and margins: "nats", or "m" for the expected error.
     """
 
     best: int
@@ -80,6 +84,7 @@ class Decision(ReadOnlyArrays):
     signature: str
     bounds: str
     determinant: str
+    unit: str = "nats"
 
     def __post_init__(self) -> None:
         for name in ("signatures", "lower", "upper", "entropies"):
@@ -106,15 +111,16 @@ class Decision(ReadOnlyArrays):
             f"{first[:1].upper()}{first[1:]}{of_total} ({candidate.length:.1f} m, {poses}"
             f"{candidate.num_closures} loop closures) {self._claim()}"
         ]
-        unit = " per pose" if self.objective == "per_pose" else ""
         ruled_out = total - len(self.survivors)
         if self.margin_met is not None:
             sentences.append(
-                f"Its upper bound, {self.upper[self.best]:.1f} nats, {'is below' if self.margin_met else 'misses'} the margin."
+                f"Its upper bound, {_value(self.upper[self.best], self.unit)}, "
+                f"{'is below' if self.margin_met else 'misses'} the margin."
             )
         elif not self.proven_optimal and math.isfinite(self.error_bound):
             sentences.append(
-                f"No candidate can be better by more than {_readable(self.error_bound)} nats{unit}; "
+                f"No candidate can be better by more than {_readable(self.error_bound, self.unit)}"
+                f"{' per pose' if self.objective == 'per_pose' else ''}; "
                 f"{ruled_out} {'was' if ruled_out == 1 else 'were'} ruled out by bounds."
             )
         elif self.proven_optimal and total > 1:
@@ -124,29 +130,39 @@ class Decision(ReadOnlyArrays):
             sentences.append(f"That is proven by {evaluated}{spared}.")
         return " ".join(sentences)
 
+    @property
+    def objective_in_words(self) -> str:
+        """"map entropy", "expected error of the map" and the like."""
+        return "expected error of the map" if self.unit == "m" else f"{self.objective} entropy"
+
     def _claim(self) -> str:
         if self.num_actions == 1:
             return "is the only candidate: there is nothing to choose from."
         by = _SIGNATURE_NAMES.get(self.signature, self.signature)
         if self.proven_optimal:
-            return f"is optimal ({self.objective} entropy)."
+            return f"is optimal ({self.objective_in_words})."
         if self.num_evaluations:
-            return f"has the least {self.objective} entropy of the {self.num_evaluations} evaluated."
+            return f"has the least {self.objective_in_words} of the {self.num_evaluations} evaluated."
         return f"is the best by {by}."
 
     def __str__(self) -> str:
-        header = ("rank", "action", "signature", "lower", "upper", "exact", "poses", "closures", "length", "survives")
+        """Summary and table; an expected error in centimetres there."""
+        scale, unit = (100.0, " (cm)") if self.unit == "m" else (1.0, "")
+        signature = 100.0 if self.signature == "resistance" else 1.0
+        numbers = (*(f"{name}{unit}" for name in ("lower", "upper", "exact")), "poses", "closures", "length", "survives")
+        header = ("rank", "action", "signature (cm)" if signature > 1 else "signature", *numbers)
         surviving = set(self.survivors.tolist())
         rows: list[tuple[str, ...]] = [header]
         ranking: list[int] = self.ranking.tolist()
         for rank, action in enumerate(ranking, start=1):
             c = self.candidates[action]
-            numbers = (self.signatures[action], self.lower[action], self.upper[action], self.entropies[action])
+            known = (scale * array[action] for array in (self.lower, self.upper, self.entropies))
+            values = (signature * self.signatures[action], *known)
             rows.append(
                 (
                     str(rank),
                     self.name(action),
-                    *("-" if math.isnan(value) else f"{value:.2f}" for value in numbers),
+                    *("-" if math.isnan(value) else f"{value:.2f}" for value in values),
                     str(c.num_new_poses),
                     str(c.num_closures),
                     f"{c.length:.1f}",
@@ -166,6 +182,7 @@ class Decision(ReadOnlyArrays):
             "signature": self.signature,
             "bounds": self.bounds,
             "determinant": self.determinant,
+            "unit": self.unit,
             "error_bound": without_nan(self.error_bound),
             "margin_met": self.margin_met,
             "num_evaluations": self.num_evaluations,
@@ -228,6 +245,7 @@ class Decision(ReadOnlyArrays):
                 signature=data["signature"],
                 bounds=data["bounds"],
                 determinant=data["determinant"],
+                unit=data.get("unit", "nats"),
                 **columns,
             )
         except KeyError as error:
@@ -236,9 +254,17 @@ class Decision(ReadOnlyArrays):
             raise InvalidInputError(f"expected a decision as to_dict writes it, got one with a bad value: {error}") from None
 
 
-def _readable(nats: float) -> str:
-    """Two digits below ten, whole nats above a hundred."""
-    return f"{nats:.0f}" if nats >= 100 else f"{nats:.1f}" if nats >= 1 else f"{nats:.2g}"
+def _readable(value: float, unit: str) -> str:
+    """Two digits below ten, whole numbers above a hundred; lengths below a metre in centimetres."""
+    if unit == "m" and value < 1:
+        value, unit = 100 * value, "cm"
+    number = f"{value:.0f}" if value >= 100 else f"{value:.1f}" if value >= 1 else f"{value:.2g}"
+    return f"{number} {unit}"
+
+
+def _value(value: float, unit: str) -> str:
+    """With one decimal; lengths in centimetres."""
+    return f"{100 * value:.1f} cm" if unit == "m" else f"{value:.1f} {unit}"
 
 
 def _from_json(value: float | None, *, unknown: float) -> float:

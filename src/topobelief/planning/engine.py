@@ -13,6 +13,7 @@ from topobelief.arrays import IntArray
 from topobelief.forms.of_graph import GraphForms
 from topobelief.forms.protocol import Forms
 from topobelief.graph.action import Action, posterior
+from topobelief.graph.alignment import DEFAULT_SAMPLE_SIZE
 from topobelief.graph.fisher import FisherRows, fisher_rows
 from topobelief.graph.pose_graph import PoseGraph
 
@@ -29,13 +30,15 @@ class Engine(ABC):
         The prior; connected.
     anchor
         The pose that bounds hold.
+    sample_size
+        Over how many poses of the prior traces are taken at most.
     """
 
     batch_size: int
     """Actions that are best asked for together."""
 
-    def __init__(self, graph: PoseGraph, anchor: int) -> None:
-        self.graph, self.anchor = graph, anchor
+    def __init__(self, graph: PoseGraph, anchor: int, *, sample_size: int = DEFAULT_SAMPLE_SIZE) -> None:
+        self.graph, self.anchor, self.sample_size = graph, anchor, sample_size
 
     @abstractmethod
     def groups(self, actions: Sequence[Action]) -> list[Group]:
@@ -48,7 +51,9 @@ class Engine(ABC):
     def from_scratch(self, action: Action) -> GraphForms:
         """Forms after one action."""
         after = posterior(self.graph, action)
-        return GraphForms(after, anchor=self.anchor, prior=self.graph, prior_rows=self._prior_rows)
+        return GraphForms(
+            after, anchor=self.anchor, prior=self.graph, prior_rows=self._prior_rows, sample_size=self.sample_size
+        )
 
     @cached_property
     def _prior_rows(self) -> FisherRows:
@@ -64,4 +69,4 @@ class ScratchEngine(Engine):
         return [(np.array([place]), self.from_scratch(action)) for place, action in enumerate(actions)]
 
     def extended(self, graph: PoseGraph, anchor: int) -> ScratchEngine:
-        return ScratchEngine(graph, anchor)
+        return ScratchEngine(graph, anchor, sample_size=self.sample_size)

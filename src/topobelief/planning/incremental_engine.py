@@ -10,6 +10,7 @@ from topobelief.forms.action_batch import ActionBatch
 from topobelief.forms.increments import IncrementalForms
 from topobelief.forms.prior_factors import PriorFactors
 from topobelief.graph.action import Action
+from topobelief.graph.alignment import DEFAULT_SAMPLE_SIZE
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.engine import Engine, Group
 
@@ -21,7 +22,7 @@ class IncrementalEngine(Engine):
 
     Parameters
     ----------
-    graph, anchor
+    graph, anchor, sample_size
         As for `Engine`.
     earlier
         Factors of the graph before it grew, which are taken over where they can be.
@@ -29,9 +30,16 @@ class IncrementalEngine(Engine):
 
     batch_size = 1024  # smaller batches compute the paths that actions share more often
 
-    def __init__(self, graph: PoseGraph, anchor: int, *, earlier: PriorFactors | None = None) -> None:
-        super().__init__(graph, anchor)
-        self._prior = PriorFactors(graph, anchor, earlier=earlier)
+    def __init__(
+        self,
+        graph: PoseGraph,
+        anchor: int,
+        *,
+        sample_size: int = DEFAULT_SAMPLE_SIZE,
+        earlier: PriorFactors | None = None,
+    ) -> None:
+        super().__init__(graph, anchor, sample_size=sample_size)
+        self._prior = PriorFactors(graph, anchor, earlier=earlier, sample_size=sample_size)
 
     def groups(self, actions: Sequence[Action]) -> list[Group]:
         """All at once but for those that close so many loops that their dense part costs more than the graph."""
@@ -45,4 +53,4 @@ class IncrementalEngine(Engine):
     def extended(self, graph: PoseGraph, anchor: int) -> IncrementalEngine:
         """Orders of elimination are kept, and those parts of each factor below which nothing has changed."""
         grown = graph.group is self.graph.group and graph.num_poses >= self.graph.num_poses
-        return IncrementalEngine(graph, anchor, earlier=self._prior if grown else None)
+        return IncrementalEngine(graph, anchor, sample_size=self.sample_size, earlier=self._prior if grown else None)

@@ -24,6 +24,7 @@ from topobelief.bounds.options import BoundOptions, Determinant
 from topobelief.bounds.paper import require_equal_noise
 from topobelief.errors import InvalidActionError, InvalidGraphError, InvalidInputError, require_choice
 from topobelief.graph.action import Action, check_actions
+from topobelief.graph.alignment import DEFAULT_SAMPLE_SIZE, checked_sample_size
 from topobelief.graph.fit import warn_of_misfit
 from topobelief.graph.information import SAME_NOISE, shared_information
 from topobelief.graph.pose_graph import PoseGraph
@@ -37,6 +38,7 @@ from topobelief.planning.search import Clock, Progress, Search
 from topobelief.signatures.von_neumann import DENSE_SPECTRUM_SIZE, expected_spectrum_seconds
 
 _INCREMENTAL_WORK = 250_000  # actions times edges of the prior above which increments are faster
+_INVERSE_WORK = 100  # times that of a determinant
 _SAMPLE_SIZE = 32  # actions whose bounds tell which family to take
 _OPEN_SHARE = 0.5  # what Fischer's bounds may leave open: they and so many exact values cost as much as chained bounds of all
 
@@ -54,17 +56,20 @@ class Planner:
         The robot's belief; connected, at its maximum-likelihood estimate (`topobelief.optimize`).
     objective
         "joint": entropy of all poses after the action, the paper's. "map": of the poses that exist now, free of units and
-        recommended where paths differ in length. "per_pose": joint over the number of free poses.
+        recommended where paths differ in length. "per_pose": joint over the number of free poses. "error": the expected
+        error of the map, metres; costs, margins and bounds are then in metres too.
     signature
-        What ranks the actions: "spanning_trees", "von_neumann" (dense spectrum) or "von_neumann_approx" (degrees).
+        What ranks the actions: "spanning_trees", "von_neumann" (dense spectrum), "von_neumann_approx" (degrees) or "resistance"
+        (mean effective resistance, which goes with "error").
     bounds
         Family of bounds, for any noise but where it says otherwise. "fischer"; "fischer_step": never looser, from scratch;
         "paper": one block-isotropic Omega; "anchored": exact prior, bounded increment, far tighter, about as expensive as exact
         values; "chain": anchored, each closure given those before it, tighter still. "auto": chain where many actions are
         evaluated by increments and Fischer's bounds of some of them leave more than half open, else Fischer's; the decision
-        says which.
+        says which. Objective "error" has "fischer", "anchored" and "chain"; the last two, and by increments all of them, are
+        exact, because exact values cost less than bounds.
     determinant
-        "cholesky" or "hadamard" (looser, cheaper), in the lower bound of J.
+        "cholesky" or "hadamard" (looser, cheaper), in the lower bound of an entropy.
     window
         Closures before each one on which the family "chain" conditions it.
     engine
@@ -75,6 +80,8 @@ class Planner:
         Pose that the bounds hold. Default: the last one, where the robot is.
     normalized
         Add the noise normalisation of s_ST to "von_neumann_approx" (the paper's last remark).
+    sample_size
+        Over how many poses of the graph, evenly spaced, "error" and "resistance" are taken at most.
     allow_dense_spectrum
         Let "von_neumann" run above 3000 poses, at O(n^3) an action.
 
@@ -112,15 +119,18 @@ class Planner:
         engine: str = AUTO,
         anchor: int | None = None,
         normalized: bool = False,
+        sample_size: int = DEFAULT_SAMPLE_SIZE,
         allow_dense_spectrum: bool = False,
     ) -> None:
         require_choice("objective", objective, OBJECTIVES)
         require_choice("signature", signature, SIGNATURES)
-        require_choice("bounds", bounds, (*BOUNDS, AUTO))
         require_choice("engine", engine, (*ENGINES, AUTO))
         if engine == "incremental" and not _has_kernels():
             raise missing_packages(["numba"], ["fast"])
+        require_choice("bounds", bounds, (*BOUNDS, AUTO))
         self._criteria = Criteria(objective, signature, bounds, BoundOptions(determinant, window), normalized)
+        require_choice(f'bounds of objective "{objective}"', bounds, (*self._criteria.families, AUTO))
+        self._sample_size = checked_sample_size(sample_size)
         self._given_anchor, self._given_engine = anchor, engine
         self._allow_dense_spectrum = allow_dense_spectrum
         self._engines: dict[str, Engine] = {}
@@ -182,6 +192,7 @@ class Planner:
             engine=self._given_engine,
             anchor=self._given_anchor,
             normalized=criteria.normalized,
+            sample_size=self._sample_size,
             allow_dense_spectrum=self._allow_dense_spectrum,
         )
         grown._engines = {name: engine.extended(graph, grown._anchor) for name, engine in self._engines.items()}
@@ -204,7 +215,8 @@ class Planner:
         actions
             At least one.
         margin
-            Uncertainty that is good enough, nats, cost included: Algorithm 1's first branch, one upper bound.
+            Uncertainty that is good enough, in the objective's unit, cost included: Algorithm 1's first branch, one upper
+            bound.
         proof
             "none": signatures only. "bounded": bounds of all actions. "optimal": exact evaluations along the ranking until
             no bound is below the best value found.
@@ -230,7 +242,7 @@ class Planner:
         IllConditionedError
             Where double precision cannot give a quantity.
         """
-        _check_limits(margin, proof, max_evaluations, deadline)
+        _check_limits(margin, proof, max_evaluations, deadline, self._criteria.objective_itself.unit)
         check_actions(self._graph, actions)
         self._refuse_dense_spectrum(self._graph.num_poses + max(action.num_new_poses for action in actions))
         if self._criteria.bounds == "paper":
@@ -253,7 +265,7 @@ class Planner:
         return search.decision()
 
     def entropies(self, actions: Sequence[Action], *, on_progress: Progress | None = None) -> FloatArray:
-        """The exact objective of each action, shape (K,), nats, cost excluded: standard belief space planning.
+        """The exact objective of each action, shape (K,), nats or metres, cost excluded: standard belief space planning.
 
         Parameters
         ----------
@@ -275,11 +287,12 @@ class Planner:
         """The engine that was asked for, or the one that is worth its time."""
         name = self._given_engine
         if name == AUTO:
-            large = num_actions * self._graph.num_edges >= _INCREMENTAL_WORK
+            work = num_actions * self._graph.num_edges * (_INVERSE_WORK if self._criteria.needs_inverses else 1)
+            large = work >= _INCREMENTAL_WORK
             worthwhile = large or self._criteria.bounds in ("anchored", "chain")
             name = "incremental" if worthwhile and _has_kernels() else "scratch"
         if name not in self._engines:
-            self._engines[name] = chosen(ENGINES, name)(self._graph, self._anchor)
+            self._engines[name] = chosen(ENGINES, name)(self._graph, self._anchor, sample_size=self._sample_size)
         return self._engines[name]
 
     def _refuse_dense_spectrum(self, num_poses: int) -> None:
@@ -313,15 +326,16 @@ class Planner:
 
 
 def _cheapest_bounds(engine: Engine, criteria: Criteria, actions: Sequence[Action]) -> str:
-    """The family by which a proof is expected to cost least: Fischer's, unless it leaves most of a sample open."""
-    if engine.batch_size == 1:
-        return "fischer"
+    """The family by which a proof is expected to cost least: the cheap one, unless it leaves most of a sample open."""
+    cheap, tight = criteria.objective_itself.cheap_bounds, criteria.objective_itself.tight_bounds
+    if engine.batch_size == 1 or cheap == tight:
+        return cheap
     places: list[int] = np.unique(np.linspace(0, len(actions) - 1, _SAMPLE_SIZE).astype(int)).tolist()
     sample = [actions[place] for place in places]
-    lower, upper = Batch(engine, replace(criteria, bounds="fischer"), sample, places).bounds()
+    lower, upper = Batch(engine, replace(criteria, bounds=cheap), sample, places).bounds()
     costs = np.array([action.cost for action in sample])
     num_open = np.count_nonzero(lower + costs <= (upper + costs).min()) - 1  # without the best
-    return "fischer" if num_open <= _OPEN_SHARE * (len(sample) - 1) else "chain"
+    return cheap if num_open <= _OPEN_SHARE * (len(sample) - 1) else tight
 
 
 def _has_kernels() -> bool:
@@ -329,10 +343,10 @@ def _has_kernels() -> bool:
     return find_spec("numba") is not None
 
 
-def _check_limits(margin: float | None, proof: str, max_evaluations: int | None, deadline: float | None) -> None:
+def _check_limits(margin: float | None, proof: str, max_evaluations: int | None, deadline: float | None, unit: str) -> None:
     require_choice("proof", proof, get_args(Proof))
     if margin is not None and not math.isfinite(margin):
-        raise InvalidInputError(f"expected a finite margin in nats, got {margin}")
+        raise InvalidInputError(f"expected a finite margin in {unit}, got {margin}")
     if margin is not None and proof == "optimal":
         raise InvalidInputError('expected a margin or proof="optimal", got both; a margin asks for one upper bound only')
     if max_evaluations is not None and max_evaluations < 0:

@@ -13,12 +13,17 @@ OBJECTIVES = {
     "joint": "topobelief.objectives.joint:OBJECTIVE",
     "map": "topobelief.objectives.map:OBJECTIVE",
     "per_pose": "topobelief.objectives.per_pose:OBJECTIVE",
+    "error": "topobelief.objectives.error:OBJECTIVE",
 }
 SIGNATURES = {
     "spanning_trees": "topobelief.signatures.spanning_trees:spanning_trees",
     "von_neumann": "topobelief.signatures.von_neumann:von_neumann",
     "von_neumann_approx": "topobelief.signatures.von_neumann:von_neumann_approx",
+    "resistance": "topobelief.signatures.resistance:resistance",
 }
+SIGNATURE_UNITS = {"spanning_trees": "nats", "resistance": "m"}
+"""Of the signatures that estimate an objective of this unit; from these the cost is taken before actions are ranked."""
+
 BOUNDS = {
     "paper": "topobelief.bounds.paper:paper",
     "fischer": "topobelief.bounds.fischer:fischer",
@@ -26,6 +31,18 @@ BOUNDS = {
     "anchored": "topobelief.bounds.anchored:anchored",
     "chain": "topobelief.bounds.chain:chain",
 }
+"""Families of bounds of ln det I, for the entropies: all names."""
+
+ERROR_BOUNDS = {
+    "fischer": "topobelief.bounds.squared_error:fischer",
+    "anchored": "topobelief.bounds.squared_error:exact",
+    "chain": "topobelief.bounds.squared_error:exact",
+}
+"""Families of bounds of the squared expected error; the last two are exact."""
+
+FAMILIES = {"log_det": BOUNDS, "squared_error": ERROR_BOUNDS}
+"""Families of bounds by what an objective is a function of (`Objective.argument`)."""
+
 ENGINES = {
     "scratch": "topobelief.planning.engine:ScratchEngine",
     "incremental": "topobelief.planning.incremental_engine:IncrementalEngine",

@@ -81,8 +81,7 @@ class Search:
                 self._bound(places, batch)
             done += len(places)
             self._clock.report("signatures", done, len(different))
-        in_nats = self._criteria.signature == "spanning_trees"
-        costs = self._costs if in_nats else np.zeros_like(self._costs)
+        costs = self._costs if self._criteria.signature_estimates_objective else np.zeros_like(self._costs)
         self._signatures = self._signatures[self._first]
         self._ranking = ranking_of(self._signatures, costs).tolist()
 
@@ -241,4 +240,5 @@ class Search:
             signature=criteria.signature,
             bounds=criteria.bounds,
             determinant=criteria.options.determinant,
+            unit=criteria.objective_itself.unit,
         )

@@ -35,6 +35,7 @@ _OBJECTIVES = {
     "joint": "joint entropy of all poses after the action (nats)",
     "map": "entropy of the poses that exist now, after the action (nats)",
     "per_pose": "joint entropy per pose after the action (nats)",
+    "error": "expected error of the map after the action (m)",
 }
 
 
@@ -165,6 +166,6 @@ def _subtitle(decision: Decision) -> str:
         return f"{ranked}; the chosen one is proven optimal"
     if math.isinf(decision.error_bound):
         return f"{ranked}; not all have bounds"
-    unit = "nats per pose" if decision.objective == "per_pose" else "nats"
+    unit = "nats per pose" if decision.objective == "per_pose" else decision.unit
     bound = f"{decision.error_bound:.3g}" if decision.error_bound < 1000 else f"{decision.error_bound:.0f}"
     return f"{ranked}; none is better than the chosen one by more than {bound} {unit}"

@@ -19,13 +19,13 @@ def candidate_table(decision: Decision) -> Table:
 
     The last column says whether an action is chosen, may be better still, or cannot be the best.
     """
-    unit = "nats per pose" if decision.objective == "per_pose" else "nats"
+    unit = "nats per pose" if decision.objective == "per_pose" else decision.unit
     table = Table(
         box=box.SIMPLE_HEAD,
         padding=(0, 1),
         collapse_padding=True,
         pad_edge=False,
-        caption=f"lower, upper: bounds of the {decision.objective} entropy in {unit}; the less, the better.\n"
+        caption=f"lower, upper: bounds of the {decision.objective_in_words} in {unit}; the less, the better.\n"
         "Paths are numbered from 0.",
         caption_justify="left",
     )
