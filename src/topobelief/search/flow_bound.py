@@ -121,7 +121,7 @@ class FlowBound:
         _, _, part = heapq.heappop(self._open)
         parts = [part]
         if part.fresh >= _STEPS_BEFORE_SPLIT and part.slow >= 1:
-            halves = self._split(part) if math.isfinite(self._best) else None
+            halves = self._split(part)
             if halves is not None:
                 parts = halves
             elif part.slow >= _SLOW_STEPS:
