@@ -18,6 +18,7 @@ Reason = Literal["proof", "gap", "deadline", "interrupt", "rest"]
 _BATCH = 64  # evaluations between two looks at the clock
 _WARM_UP = 128  # evaluations before the first step of the bound
 _PATIENCE = 800  # evaluations without improvement after which local search rests
+_MOST_IDLE = 20  # restarts in a row that come upon known walks only, after which it rests too
 _STEPS_PER_LOOK = 30  # of the bound, in which it closes at least
 _LEAST_PROGRESS = 0.02  # this share of the gap, or rests; with a deadline it goes on
 
@@ -107,7 +108,7 @@ class AnytimeSearch:
         """One batch of local search; whether there was anything left worth trying."""
         if len(self._evaluations) - self._at_best > _PATIENCE:
             return False
-        return (self._local.step(_BATCH) or self._local.restart(_BATCH)) > 0
+        return self._local.step(_BATCH) > 0 or any(self._local.restart(_BATCH) for _ in range(_MOST_IDLE))
 
     def _bound_on(self) -> bool:
         """One step of the bound; whether it may still make progress."""

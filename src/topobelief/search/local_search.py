@@ -22,7 +22,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 from scipy.spatial import KDTree
 
-from topobelief.arrays import FloatArray, IntArray
+from topobelief.arrays import BoolArray, FloatArray, IntArray
 from topobelief.search.evaluations import Evaluations
 from topobelief.search.front import on_front, spread_on_front
 from topobelief.search.walks import Walk, Walks
@@ -226,21 +226,29 @@ class _Change:
         self.vias, self.inserted, self.walk = vias, inserted, walk
 
 
-def spread_vias(walks: Walks, useful: Sequence[bool] | FloatArray, count: int) -> IntArray:
+def spread_vias(walks: Walks, useful: BoolArray, count: int) -> IntArray:
     """Vertices all over what is in reach, to lead walks through.
 
     Parameters
     ----------
     walks
     useful : shape (V,), bool
-        Vertices that may be taken.
+        Vertices that are taken before others.
     count
         How many at most: each is as far as can be from those before it.
     """
-    vertices = np.flatnonzero(walks.in_reach & np.asarray(useful, dtype=bool))
-    places = walks.roadmap.vertices[vertices]
+    first, others = walks.in_reach & useful, walks.in_reach & ~useful
+    vertices = _far_apart(walks.roadmap.vertices, np.flatnonzero(first), count)
+    return np.concatenate([vertices, _far_apart(walks.roadmap.vertices, np.flatnonzero(others), count - len(vertices))])
+
+
+def _far_apart(all_places: FloatArray, vertices: IntArray, count: int) -> IntArray:
+    """Some of the vertices, each as far as can be from those before it."""
     if len(vertices) <= count:
         return vertices
+    if count == 0:
+        return vertices[:0]
+    places = all_places[vertices]
     chosen, distance = [0], np.linalg.norm(places - places[0], axis=1)
     while len(chosen) < count:
         chosen.append(int(np.argmax(distance)))

@@ -190,5 +190,5 @@ _NAMES = {
 def said(value: float, objective: str) -> str:
     """A value with its unit as a person reads it: centimetres for errors, nats for entropies."""
     if objective == "error":
-        return f"{100 * value:.1f} cm" if abs(value) < 1 else f"{value:.2f} m"
+        return f"{100 * value:#.3g} cm" if abs(value) < 1 else f"{value:.2f} m"
     return f"{value:.1f} {_UNITS.get(objective, 'nats')}" if objective != "per_pose" else f"{value:.3f} nats per pose"
