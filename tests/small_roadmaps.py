@@ -30,7 +30,9 @@ def small_roadmap(rng, graph, *, num_vertices=9, extent=4.0):
     low, high = np.maximum(low, -extent), np.minimum(high, extent)
     vertices = np.vstack([graph.positions[-1], rng.uniform(low, high, (num_vertices - 1, 2))])
     triangles = Delaunay(vertices).simplices
-    edges = np.unique(np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [0, 2]]]), axis=1), axis=0)
+    edges = np.unique(
+        np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [0, 2]]]), axis=1), axis=0
+    )
     return Roadmap(OPEN, 0.1, OPEN.component((0.0, 0.0), 0.1), vertices, edges)
 
 

@@ -39,7 +39,7 @@ class Evaluations:
         self.cost_per_metre = cost_per_metre
         self.objectives: dict[Walk, float] = {}  # in the order of their evaluation, cost excluded
         self.lengths: dict[Walk, float] = {}  # metres
-        self.sees_map = False  # whether a loop is closed on any walk so far
+        self.sees_map = False  # whether a loop with the map is closed on any walk so far
 
     def __len__(self) -> int:
         return len(self.objectives)
@@ -60,10 +60,14 @@ class Evaluations:
         paths = [self.path(walk) for walk in new]
         actions = self._predict(paths)
         values = self._planner.entropies(actions).tolist()
-        self.sees_map |= any(action.num_closures for action in actions)
+        self.sees_map = self.sees_map or any(self._closes_with_map(action) for action in actions)
         for walk, path, value in zip(new, paths, values, strict=True):
             self.lengths[walk] = path_length(path)
             self.objectives[walk] = value
+
+    def _closes_with_map(self, action: Action) -> bool:
+        source, target = action.edges.T
+        return bool(((source >= self._planner.graph.num_poses) & (target < self._planner.graph.num_poses)).any())
 
     def action(self, walk: Walk) -> Action:
         """What driving a walk adds to the graph; its cost is that of its length."""

@@ -53,5 +53,5 @@ def spread_on_front(lengths: FloatArray, count: int) -> IntArray:
     """
     if len(lengths) <= count:
         return np.arange(len(lengths))
-    limits = np.linspace(lengths[0], lengths[-1], count)
+    limits: FloatArray = np.linspace(float(lengths[0]), float(lengths[-1]), count)
     return np.unique(np.searchsorted(lengths, limits, side="right") - 1)

@@ -7,17 +7,17 @@ A walk is the chain of shortest ways between its via-vertices (`walks`). Its nei
 - omission of one, exchange of two;
 - recombination: the first part of one walk up to a vertex, and the second part of another walk from there.
 
-The search keeps all walks that it has evaluated. The *leaders* are the best of them that differ from each other, and some of the
-best at shorter lengths, which have room for insertions. Neighbours of the first leader that has any left are evaluated, a
-batch at a time, most promising first: insertions whose via-vertex has gained most per metre so far. The search rests when all
-neighbours of all leaders are known; from then on it starts again from a leader some of whose via-vertices are replaced by random
-ones.
+The search keeps all walks that it has evaluated. The *leaders* are the best of them that differ from each other, and some of
+the best at shorter lengths, which have room for insertions. Neighbours of the first leader that has any left are evaluated, a
+batch at a time, most promising first: insertions whose via-vertex has gained most per metre so far. When all neighbours of all
+leaders are known, the search starts again from a leader some of whose via-vertices are replaced by random ones.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -32,8 +32,18 @@ Vias = tuple[int, ...]
 _NUM_LEADERS = 6
 _NUM_SHORTER = 6  # leaders at shorter lengths
 _DIFFERENT = 0.05  # share of the length limit by which leaders differ (Fréchet)
+_LEAST_EXTRA = 0.02  # share of the length limit that an insertion counts as at least
 _NUM_NEAR = 8  # vertices near a via-vertex that may replace it
 _MOST_COMPARED = 250  # walks among which leaders are looked for
+
+
+@dataclass(frozen=True, slots=True)
+class _Change:
+    """A neighbour of a walk, by its via-vertices or as a walk."""
+
+    vias: Vias
+    inserted: int | None = None  # the one that is new
+    walk: Walk | None = None
 
 
 class LocalSearch:
@@ -107,8 +117,7 @@ class LocalSearch:
     def _shaken(self, vias: Vias) -> Vias:
         kept = [via for via in vias if self._rng.random() < 0.5]
         for _ in range(2):
-            changes = [change for change in self._insertions(tuple(kept))]
-            if changes:
+            if changes := self._insertions(tuple(kept)):
                 kept = list(changes[int(self._rng.integers(len(changes)))].vias)
         return tuple(kept)
 
@@ -121,14 +130,14 @@ class LocalSearch:
         value, length = self._evaluations.value(leader), self._evaluations.lengths[leader]
         for change, walk in zip(batch, walks, strict=True):
             if change.inserted is not None:
-                metres = max(self._evaluations.lengths[walk] - length, 0.02 * self._walks.max_length)
+                metres = max(self._evaluations.lengths[walk] - length, _LEAST_EXTRA * self._walks.max_length)
                 gain = (value - self._evaluations.value(walk)) / metres
                 self._yield[change.inserted] = max(gain, self._yield.get(change.inserted, -np.inf))
 
     def _leaders(self) -> list[Walk]:
         """The best walks that differ from each other, then some of the best at shorter lengths."""
         walks, lengths, values = self._evaluations.arrays()
-        best_first = np.argsort(values, kind="stable")[: _MOST_COMPARED].tolist()
+        best_first = np.argsort(values, kind="stable")[:_MOST_COMPARED].tolist()
         leaders = self._evaluations.different(best_first, _NUM_LEADERS, _DIFFERENT * self._walks.max_length)
         shorter = on_front(lengths, values)
         spread = shorter[spread_on_front(lengths[shorter], _NUM_SHORTER)]
@@ -147,21 +156,26 @@ class LocalSearch:
         while batch := list(itertools.islice(changes, size)):
             yield batch
 
-    def _insertions(self, vias: Vias) -> list[_Change]:
-        """One more via-vertex, in each place where it is within the length."""
+    def _insertions(self, vias: Vias, places: Iterable[int] | None = None) -> list[_Change]:
+        """One more via-vertex where that is within the length; those first that have gained most per metre so far.
+
+        Parameters
+        ----------
+        vias
+        places
+            Where in the order it may come. Default: anywhere.
+        """
         stops = self._walks.stops(vias)
         self._walks.prepare(stops)
-        length = self._walks.length(vias)
+        length, candidates = self._walks.length(vias), self._candidates
         found: list[tuple[float, _Change]] = []
-        places = len(stops) if self._walks.end is None else len(stops) - 1
-        for place in range(places):
-            extra = self._walks.distances(stops[place])[self._candidates]
+        for place in range(len(vias) + 1) if places is None else places:
+            before = self._walks.distances(stops[place])
+            total = length + before[candidates]
             if place + 1 < len(stops):
-                extra = extra + self._walks.distances(stops[place + 1])[self._candidates]
-                extra = extra - self._walks.distances(stops[place])[stops[place + 1]]
-            fits = length + extra <= self._walks.limit
-            for via, metres in zip(self._candidates[fits].tolist(), extra[fits].tolist(), strict=True):
-                rank = self._yield.get(via, np.inf) / max(metres, 0.02 * self._walks.max_length)
+                after = stops[place + 1]
+                total += self._walks.distances(after)[candidates] - before[after]
+            for via in candidates[total <= self._walks.limit].tolist():
                 rank = self._yield.get(via, np.inf)
                 found.append((-rank, _Change((*vias[:place], via, *vias[place:]), inserted=via)))
         found.sort(key=lambda each: each[0])
@@ -173,12 +187,8 @@ class LocalSearch:
             for other in self._neighbours(via):
                 yield from self._within((*vias[:place], other, *vias[place + 1 :]))
         for place in range(len(vias)):
-            rest = (*vias[:place], *vias[place + 1 :])
-            for change in self._insertions_at(rest, place):
-                yield change
-
-    def _insertions_at(self, vias: Vias, place: int) -> list[_Change]:
-        return [change for change in self._insertions(vias) if change.vias[:place] == vias[:place] and change.vias[place + 1 :] == vias[place:]]
+            for change in self._insertions((*vias[:place], *vias[place + 1 :]), [place]):
+                yield _Change(change.vias)
 
     def _neighbours(self, via: int) -> list[int]:
         _, near = self._near.query(self._walks.roadmap.vertices[via], k=min(_NUM_NEAR + 1, len(self._reachable)))
@@ -215,15 +225,6 @@ class LocalSearch:
     def _within(self, vias: Vias) -> Iterator[_Change]:
         if self._walks.length(vias) <= self._walks.limit:
             yield _Change(vias)
-
-
-class _Change:
-    """A neighbour of a walk, by its via-vertices or as a walk."""
-
-    __slots__ = ("inserted", "vias", "walk")
-
-    def __init__(self, vias: Vias, *, inserted: int | None = None, walk: Walk | None = None) -> None:
-        self.vias, self.inserted, self.walk = vias, inserted, walk
 
 
 def spread_vias(walks: Walks, useful: BoolArray, count: int) -> IntArray:

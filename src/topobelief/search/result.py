@@ -66,7 +66,7 @@ class SearchResult(ReadOnlyArrays):
     max_length : float
         Metres; the limit.
     sees_map : bool
-        Whether a loop would be closed on any way that was evaluated.
+        Whether any way that was evaluated would close a loop with the map.
     num_evaluations : int
         Exact evaluations made.
     seconds : float
@@ -140,7 +140,8 @@ class SearchResult(ReadOnlyArrays):
         noun = "loop closure" if closures == 1 else "loop closures"
         after = said(self.best.value - self.best.action.cost, self.objective)
         now = said(self.value_now, self.objective)
-        return f"The best way found is {self.length:.1f} m long and closes {closures} {noun}: {_NAMES[self.objective]} {after}, now {now}."
+        found = f"The best way found is {self.length:.1f} m long and closes {closures} {noun}"
+        return f"{found}: {_NAMES[self.objective]} {after}, now {now}."
 
     def _comparison(self) -> list[str]:
         if self.shortest is None or self.shortest.length >= self.length:
@@ -161,8 +162,8 @@ class SearchResult(ReadOnlyArrays):
     def __repr__(self) -> str:
         bound = "none" if math.isinf(self.lower_bound) else f"{self.lower_bound:.4g}"
         return (
-            f"SearchResult({self.length:.1f} m, {self.action.num_closures} closures, {self.objective} {self.value:.4g} {self.unit}, "
-            f"bound {bound}, {len(self.alternatives)} alternatives)"
+            f"SearchResult({self.length:.1f} m, {self.action.num_closures} closures, "
+            f"{self.objective} {self.value:.4g} {self.unit}, bound {bound}, {len(self.alternatives)} alternatives)"
         )
 
     def _repr_html_(self) -> str:

@@ -7,6 +7,7 @@ takes them in turns.
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
 from collections.abc import Callable
@@ -96,8 +97,8 @@ def search_roadmap(
     num_alternatives
         How many other ways to return at most.
     spacing, turn, information, start
-        As for `predict_actions`; by default new poses stand every metre, and not where the path turns. With a `turn` there is no
-        lower bound.
+        As for `predict_actions`; by default new poses stand every metre, and not where the path turns. With a `turn` there is
+        no lower bound.
     earlier
         A result on the same roadmap whose ways are tried too: after a search with a smaller limit the value is never worse.
     seed
@@ -136,8 +137,8 @@ def search_roadmap(
         )
 
     evaluations = Evaluations(planner, predict, walks.roadmap.vertices, cost_per_metre)
-    near = KDTree(graph.positions[:, :2]).query(walks.roadmap.vertices)[0] < model.radius
-    candidates = spread_vias(walks, near, _NUM_CANDIDATES)
+    to_poses: FloatArray = np.asarray(KDTree(graph.positions[:, :2]).query(walks.roadmap.vertices)[0])
+    candidates = spread_vias(walks, to_poses < model.radius, _NUM_CANDIDATES)
     local = LocalSearch(walks, evaluations, candidates, rng=np.random.default_rng(seed))
 
     def bound() -> WalkBound:
@@ -158,9 +159,7 @@ def search_roadmap(
         )
 
     make_bound = bound if turn is None else None  # it knows of no poses at corners
-    search = AnytimeSearch(
-        evaluations, local, make_bound, began=began, deadline=deadline, gap=gap, on_progress=on_progress
-    )
+    search = AnytimeSearch(evaluations, local, make_bound, began=began, deadline=deadline, gap=gap, on_progress=on_progress)
     stopped_by = search.run([walks.walk(()), *_walks_of(earlier, walks.roadmap)])
 
     def way(walk: Walk) -> Way:
@@ -168,15 +167,16 @@ def search_roadmap(
 
     every, lengths, values = evaluations.arrays()
     best = evaluations.best()
-    best_first = [every.index(best), *np.argsort(values, kind="stable").tolist()]
+    best_first: list[int] = [every.index(best), *np.argsort(values, kind="stable").tolist()]
     others = evaluations.different(best_first, num_alternatives + 1, _DIFFERENT * walks.max_length)[1:]
     objectives = values - cost_per_metre * lengths
     front = on_front(lengths, objectives)
+    walks_on_front: list[Walk] = [every[index] for index in front.tolist()]
     stay = Action(np.zeros((0, graph.poses.shape[1])), np.zeros((0, 2), np.int64), omega)
     return SearchResult(
         best=way(best),
         alternatives=tuple(way(walk) for walk in others),
-        on_front=tuple(way(every[index]) for index in front.tolist()),
+        on_front=tuple(map(way, walks_on_front)),
         front=np.column_stack([lengths[front], objectives[front]]),
         lower_bound=search.lower_bound,
         covers=search.covers,
@@ -234,7 +234,9 @@ def _walks_within(
         roadmap, end = roadmap.between(roadmap.vertices[0], place), 1
     shortest = float(roadmap.distances_to(end)[0])
     if math.isinf(shortest):
-        raise PlanningError(f"expected a goal that the roadmap leads to, got ({place[0]:g}, {place[1]:g}); build a roadmap for it")
+        raise PlanningError(
+            f"expected a goal that the roadmap leads to, got ({place[0]:g}, {place[1]:g}); build a roadmap for it"
+        )
     walks = Walks(roadmap, end, max_detour * shortest if max_length is None else max_length)
     if shortest > walks.limit:
         raise PlanningError(
@@ -252,7 +254,7 @@ def _walks_of(earlier: SearchResult | None, roadmap: Roadmap) -> list[Walk]:
     for way in (earlier.best, *earlier.alternatives, *earlier.on_front):
         distances, vertices = tree.query(way.path)
         walk = tuple(np.atleast_1d(vertices).tolist())
-        joined = all((min(pair), max(pair)) in edges for pair in zip(walk[:-1], walk[1:], strict=True))
+        joined = all((min(pair), max(pair)) in edges for pair in itertools.pairwise(walk))
         if joined and np.max(distances) <= _SAME_PLACE:
             walks.append(walk)
     return walks

@@ -1,9 +1,9 @@
 """Walks on a roadmap, described by the few vertices through which they are led.
 
-A walk is a sequence of vertices, each joined to the next by an edge of the roadmap. Every walk is a chain of shortest ways: from
-its first vertex to a *via-vertex*, from there to the next, and so on. Few via-vertices say all of it, and changing one of them
-changes the walk in a way that makes sense to drive. Distances from a vertex to all others are computed once, when the vertex
-first becomes a via-vertex.
+A walk is a sequence of vertices, each joined to the next by an edge of the roadmap. Every walk is a chain of shortest ways:
+from its first vertex to a *via-vertex*, from there to the next, and so on. Few via-vertices say all of it, and changing one of
+them changes the walk in a way that makes sense to drive. Distances from a vertex to all others are computed once, when the
+vertex first becomes a via-vertex.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ class Walks:
 
         Where the roadmap has several shortest ways between two vertices, they may describe another walk of the same length.
         """
-        so_far, vias, first = self.lengths_along(walk), [], 0
+        so_far, vias, first = self.lengths_along(walk), list[int](), 0
         while first < len(walk) - 1:
             distances = self.distances(walk[first])
             last = first + 1
