@@ -66,7 +66,9 @@ def main() -> None:
     for name, pairs in zip(("key poses", "closures", "gain"), zip(*(row.pairs for row in sums), strict=True), strict=True):
         ratios = [predicted / found for predicted, found in pairs if found]
         low, median, high = np.quantile(ratios, [0.1, 0.5, 0.9])
-        print(f"{name}: predicted over found, median {median:.2f} over {len(ratios)} runs (10 to 90 %: {low:.2f} to {high:.2f})")
+        print(
+            f"{name}: predicted over found, median {median:.2f} over {len(ratios)} runs (10 to 90 %: {low:.2f} to {high:.2f})"
+        )
 
 
 def keep(record: Record, folder: Path) -> None:

@@ -33,7 +33,7 @@ _OVERVIEW_BELOW = 0.6  # share of the whole map's width and height
 
 
 @dataclass(frozen=True, slots=True)
-class _View:
+class View:
     """A rectangle of the plane, metres."""
 
     x_min: float
@@ -42,7 +42,7 @@ class _View:
     y_max: float
 
     @classmethod
-    def around(cls, points: FloatArray, *, padding: float) -> _View:
+    def around(cls, points: FloatArray, *, padding: float) -> View:
         """All points with room around, and no side so short that nothing of the surroundings would be seen."""
         low, high = points.min(axis=0), points.max(axis=0)
         pads = np.maximum(padding * np.max(high - low), (_MIN_VIEW - (high - low)) / 2)
@@ -56,11 +56,11 @@ class _View:
     def aspect(self) -> float:
         return self.size[1] / self.size[0]
 
-    def reshaped(self, aspect: float) -> _View:
+    def reshaped(self, aspect: float) -> View:
         """The smallest view around this one with the given height per width."""
         width, height = self.size
         dx, dy = max(0.0, height / aspect - width) / 2, max(0.0, width * aspect - height) / 2
-        return _View(self.x_min - dx, self.y_min - dy, self.x_max + dx, self.y_max + dy)
+        return View(self.x_min - dx, self.y_min - dy, self.x_max + dx, self.y_max + dy)
 
     def shown_on(self, panel: Panel) -> None:
         panel.limits((self.x_min, self.x_max), (self.y_min, self.y_max))
@@ -101,10 +101,10 @@ def draw_paths(
         `topobelief.report.canvas.save_figure` writes it.
     """
     begin, end = find_start(graph, start, world=world), np.asarray(goal, dtype=np.float64)
-    closures = _predicted_closures(graph, begin, actions[decision.best])
+    closures = predicted_closures(graph, begin, actions[decision.best])
     seen = np.concatenate([begin.place[None], end[None], *paths, closures.reshape(-1, 2)])
     everything = np.concatenate([np.reshape(world.free.bounds, (2, 2)), graph.positions, seen])
-    view, whole = _View.around(seen, padding=0.07), _View.around(everything, padding=0.02)
+    view, whole = View.around(seen, padding=0.07), View.around(everything, padding=0.02)
     part = max(near / far for near, far in zip(view.size, whole.size, strict=True))
     zoomed = part < _OVERVIEW_BELOW
     view = view if zoomed else whole
@@ -115,8 +115,8 @@ def draw_paths(
         side = _LEFT + width + _SIDE_GAP
         canvas = Canvas(side + _SIDE_WIDTH, _BOTTOM + height + _TOP)
         panel = canvas.panel(_LEFT, _BOTTOM, width, height)
-        key = _draw_world(panel, world, view)
-        key += _draw_graph(panel, graph, view)
+        key = draw_world(panel, world, view)
+        key += draw_graph(panel, graph, view)
         key += _draw_candidates(panel, paths, closures, decision)
         key += _draw_ends(panel, graph, begin, end)
         view.shown_on(panel)
@@ -126,21 +126,21 @@ def draw_paths(
             free_height = min(height - _KEY_LINE * len(key) - 0.2, 0.5 * height)
             across = min(_SIDE_WIDTH - 0.2, free_height / whole.aspect)
             overview = canvas.panel(side, _BOTTOM + height - across * whole.aspect, across, across * whole.aspect)
-            _draw_overview(overview, world, graph, paths[decision.best], whole, view)
+            draw_overview(overview, world, graph, paths[decision.best], whole, view)
             canvas.text(side, _BOTTOM + height + 0.10, _extent(whole), fontsize=8, color=style.MUTED)
         y, corner = (_BOTTOM, "lower left") if zoomed else (_BOTTOM + height, "upper left")
         canvas.key(key, side, y, corner=corner)
     return canvas.figure
 
 
-def _draw_world(panel: Panel, world: World, view: _View) -> list[Entry]:
+def draw_world(panel: Panel, world: World, view: View) -> list[Entry]:
     panel.axes.set_facecolor(style.NOT_FREE)
     outline = float(np.clip(60 / max(view.size), 0.15, 0.7))  # walls of a town must not hide its streets
     panel.region(world.free, facecolor=style.FREE, edgecolor=style.WALL, linewidth=outline, zorder=0)
     return [Entry("not free", patch=True, facecolor=style.NOT_FREE, edgecolor=style.WALL, linewidth=0.7)]
 
 
-def _draw_graph(panel: Panel, graph: PoseGraph, view: _View) -> list[Entry]:
+def draw_graph(panel: Panel, graph: PoseGraph, view: View) -> list[Entry]:
     """Odometry and loop closures of the prior; the more poses in view, the thinner."""
     low, high = (view.x_min, view.y_min), (view.x_max, view.y_max)
     inside = ((graph.positions >= low) & (graph.positions <= high)).all(axis=1)
@@ -196,8 +196,8 @@ def _draw_ends(panel: Panel, graph: PoseGraph, start: Start, goal: FloatArray) -
     return key
 
 
-def _draw_overview(panel: Panel, world: World, graph: PoseGraph, best: FloatArray, whole: _View, view: _View) -> None:
-    _draw_world(panel, world, whole)
+def draw_overview(panel: Panel, world: World, graph: PoseGraph, best: FloatArray, whole: View, view: View) -> None:
+    draw_world(panel, world, whole)
     odometry = graph.edges[np.abs(graph.edges[:, 0] - graph.edges[:, 1]) == 1]
     panel.segments(graph.positions[odometry], colors=style.ODOMETRY, linewidths=0.3)
     panel.line(best, color=style.BEST, linewidth=0.8)
@@ -206,7 +206,7 @@ def _draw_overview(panel: Panel, world: World, graph: PoseGraph, best: FloatArra
     panel.no_ticks()
 
 
-def _predicted_closures(graph: PoseGraph, start: Start, action: Action) -> FloatArray:
+def predicted_closures(graph: PoseGraph, start: Start, action: Action) -> FloatArray:
     """Segments of the action's edges other than its odometry, shape (closures, 2, 2)."""
     positions = np.concatenate([graph.positions, graph.group.position(action.poses)])
     low, high = np.sort(action.edges, axis=1).T
@@ -227,5 +227,5 @@ def _subtitle(decision: Decision) -> str:
     return f"{best.length:.1f} m, {best.num_new_poses} new poses, {best.num_closures} predicted loop closures"
 
 
-def _extent(view: _View) -> str:
+def _extent(view: View) -> str:
     return f"whole map, {view.size[0]:.0f} × {view.size[1]:.0f} m"

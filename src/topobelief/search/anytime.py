@@ -16,7 +16,7 @@ Reason = Literal["proof", "gap", "deadline", "interrupt", "rest"]
 """Why a search stopped."""
 
 _BATCH = 64  # evaluations between two looks at the clock
-_WARM_UP = 128  # evaluations before the first step of the bound
+_WARM_UP = 400  # evaluations before the first step of the bound
 _PATIENCE = 500  # evaluations without improvement after which local search rests
 _MOST_IDLE = 20  # restarts in a row that come upon known walks only, after which it rests too
 _STEPS_PER_LOOK = 30  # of the bound, in which it closes at least

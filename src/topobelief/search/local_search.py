@@ -141,7 +141,8 @@ class LocalSearch:
         leaders = self._evaluations.different(best_first, _NUM_LEADERS, _DIFFERENT * self._walks.max_length)
         shorter = on_front(lengths, values)
         spread = shorter[spread_on_front(lengths[shorter], _NUM_SHORTER)]
-        return list(dict.fromkeys([*leaders, *(walks[index] for index in spread.tolist())]))
+        front: list[Walk] = [walks[index] for index in spread.tolist()]
+        return list(dict.fromkeys([*leaders, *front]))
 
     def _batches(self, walk: Walk, size: int) -> Iterator[list[_Change]]:
         """Neighbours of a walk, most promising first."""
