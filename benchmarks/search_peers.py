@@ -3,8 +3,8 @@
     python benchmarks/search_peers.py office
     python benchmarks/search_peers.py GRAPH.g2o --goal X Y
 
-Peers: k diverse paths, shortest ways through one and through two via-vertices, greedy insertion by gain per metre. The graph has
-a map beside it (the office) or is free where the robot has been.
+Peers: k diverse paths, shortest ways through one and through two via-vertices, greedy insertion by gain per metre. The graph
+has a map beside it (the office) or is free where the robot has been.
 """
 
 from __future__ import annotations
