@@ -129,7 +129,9 @@ def plan_of(graph: tb.PoseGraph, action: Action, seen: IntArray, num_idle: int =
     closures = np.zeros((count + num_idle, len(seen)))
     for new, old in action.edges[count:]:
         closures[new - n, np.searchsorted(seen, old)] += 1
-    return Plan(closures, np.concatenate([odometry, np.repeat(odometry[-1:], num_idle, axis=0)]), count, action.length or 0.0, 0.0)
+    return Plan(
+        closures, np.concatenate([odometry, np.repeat(odometry[-1:], num_idle, axis=0)]), count, action.length or 0.0, 0.0
+    )
 
 
 def random_case(seed: int) -> Case:

@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from roadmap_walks import Case, random_case
 
 import topobelief as tb
-from topobelief.search.flow_bound import FlowBound, flow_bound
+from roadmap_walks import Case, random_case
+from topobelief.search.flow_bound import flow_bound
+from topobelief.search.flows import FlowBound
 
 OBJECTIVES = ("error", "map", "joint", "per_pose")
 WITH_WALKS = (4, 8, 17, 62, 85, 96, 106, 111)  # of cases with 15 to 70 walks

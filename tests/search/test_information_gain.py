@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from roadmap_walks import map_error, plan_of, random_case
 
 import topobelief as tb
+from roadmap_walks import map_error, plan_of, random_case
 from topobelief.search.criteria import Criterion
 from topobelief.search.information_gain import gain, gain_and_slopes
 from topobelief.search.plans import Plan
@@ -56,6 +56,8 @@ def test_a_walk_is_worth_what_the_planner_says(seed):
         error = math.sqrt(prior.mean_square - gain(prior, "error", plan))
         assert error == pytest.approx(map_error(case.graph, action), rel=1e-8)
         assert error == pytest.approx(tb.expected_errors(case.graph, action).map_rmse, rel=1e-8)
+        planned = tb.Planner(case.graph, objective="error", engine="scratch").entropies([action])[0]
+        assert error == pytest.approx(planned, rel=1e-9)
 
 
 @pytest.mark.parametrize("kind", KINDS)

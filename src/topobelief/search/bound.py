@@ -1,4 +1,4 @@
-"""What a search over the walks of a roadmap asks of a bound (docs, the mathematics, section 12)."""
+"""What a search over the walks of a roadmap asks of a bound (docs, the mathematics, section 13)."""
 
 from __future__ import annotations
 

@@ -5,8 +5,8 @@
     error       (E_0^2 - gain)^1/2                + costs
     per_pose    joint / (n_0 - 1 + L)             + costs
 
-A gain at y is bounded by its gradient at x. With D = <gradient, y - x> the gain is at most gain(x) + D; but more is true. The root
-of order d of det (for a matrix of size d) and 1 / tr (K I^-1) are concave too, so that
+A gain at y is bounded by its gradient at x. With D = <gradient, y - x> the gain is at most gain(x) + D; but more is true.
+The root of order d of det (for a matrix of size d) and 1 / tr (K I^-1) are concave too, so that
 
     map, joint  gain(y) <= gain(x) + d/2 ln (1 + 2 D / d),            error  E(y)^2 >= E(x)^2 / (1 + D / E(x)^2).
 """
@@ -94,7 +94,7 @@ class Criterion:
         return self.free_poses > 0
 
     @property
-    def has_costs(self) -> bool:
+    def counts_poses(self) -> bool:
         """Whether the number of new poses counts."""
         return self.kind == "joint"
 

@@ -9,7 +9,9 @@ information (D and I_nn its diagonal blocks, B the block between). Three gains, 
 
 The gradient at (i, j) with a weight w on a measurement of information W is, P the covariance after the plan,
 
-    joint    1/2 tr W (P_ii + P_jj - P_ij - P_ji),       map: P less (I_nn)^-1 on the new poses,       error: Q = P Pi P in place of P / 2.
+    joint    1/2 tr W (P_ii + P_jj - P_ij - P_ji)
+    map      the same with P less I_nn^-1 on the new poses
+    error    the same with P Pi P in place of P / 2
 
 Only poses of the map that a plan closes loops with enter A, so that matrices are as large as their number.
 """

@@ -1,10 +1,10 @@
 """The walks of a roadmap as paths through layers of length delta, and longest paths through them.
 
-A walk that has come s metres (from the pose that the robot was at) when it reaches vertex v is at the state (v, k) with
-k delta <= s < (k + 1) delta. A way of length l leads from there to the layer of s + l, one of two: which one depends on where
-in its layer s lies, of which a state knows an interval. So every walk is a path through the layers, and some paths through them
-are no walks: they take the lower layer too often, which saves up to delta a way. What a path is told of the length that it truly
-has (`Arcs.way`) lets whoever weighs arcs charge for it.
+A walk that has come s metres (from the pose that the robot was at) when it reaches vertex v is at the state (v, k) with k
+delta <= s < (k + 1) delta. A way of length l leads from there to the layer of s + l, one of two: which one depends on where
+in its layer s lies, of which a state knows an interval. So every walk is a path through the layers, and some paths through
+them are no walks: they take the lower layer too often, which saves up to delta a way. What a path is told of the length
+that it truly has (`Arcs.way`) lets whoever weighs arcs charge for it.
 
 spacing = m delta. A way from layer k to layer k' drops the new poses t with k < t m <= k', the t-th on the piece t m - k of the
 way (`ways`), whatever s is. The last pose stands at the walk's end.
@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from topobelief.arrays import BoolArray, FloatArray, IntArray
+from topobelief.linalg.block_cholesky import Int32Array
 from topobelief.linalg.compiled import compiled
 from topobelief.search.ways import Ways
 
@@ -27,9 +28,9 @@ _TIE = 1e-9  # of a layer: lengths that differ by less are equal
 class Records:
     """New poses that arcs drop: number t = 1, 2, …, and the way and its piece (counted from 0) on which the pose stands."""
 
-    number: IntArray
-    way: IntArray
-    piece: IntArray
+    number: Int32Array
+    way: Int32Array
+    piece: Int32Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,13 +51,13 @@ class Arcs:
         Number of the walk's last pose where the arc ends it, else -1.
     """
 
-    source: IntArray
-    target: IntArray
-    way: IntArray
-    record: IntArray
-    count: IntArray
-    end: IntArray
-    last: IntArray
+    source: Int32Array
+    target: Int32Array
+    way: Int32Array
+    record: Int32Array
+    count: Int32Array
+    end: Int32Array
+    last: Int32Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,8 +111,8 @@ def build_layers(
     return Layers(num_vertices, num_layers, pieces_per_pose, first_vertex, Arcs(*arcs), Records(*records))
 
 
-def _room(num_arcs: int, num_records: int) -> tuple[IntArray, IntArray]:
-    return np.empty((7, num_arcs), np.int64), np.empty((3, num_records), np.int64)
+def _room(num_arcs: int, num_records: int) -> tuple[Int32Array, Int32Array]:
+    return np.empty((7, num_arcs), np.int32), np.empty((3, num_records), np.int32)
 
 
 @compiled
@@ -172,15 +173,23 @@ def _arcs(
     m: int,
     first_vertex: int,
     fill: bool,
-    arcs: IntArray,
-    records: IntArray,
+    arcs: Int32Array,
+    records: Int32Array,
 ) -> tuple[int, int]:
     """Count the arcs and records, and put them into the tables if asked to."""
     num_layers, num_vertices = nearest.shape
     a = r = 0
     if is_end[first_vertex]:
         if fill:
-            arcs[0, a], arcs[1, a], arcs[2, a], arcs[3, a], arcs[4, a], arcs[5, a], arcs[6, a] = first_vertex, -1, -1, 0, 0, -1, 0
+            arcs[0, a], arcs[1, a], arcs[2, a], arcs[3, a], arcs[4, a], arcs[5, a], arcs[6, a] = (
+                first_vertex,
+                -1,
+                -1,
+                0,
+                0,
+                -1,
+                0,
+            )
         a += 1
     for k in range(num_layers):
         for v in range(num_vertices):
@@ -244,7 +253,7 @@ class Longest:
     ahead: FloatArray
 
 
-def longest_path(layers: Layers, which: IntArray, weights: FloatArray) -> Longest:
+def longest_path(layers: Layers, which: Int32Array, weights: FloatArray, charge: FloatArray) -> Longest:
     """Dynamic programming forwards.
 
     Parameters
@@ -254,86 +263,134 @@ def longest_path(layers: Layers, which: IntArray, weights: FloatArray) -> Longes
         Arcs that may be used, ascending.
     weights : shape (A,)
         Of arcs within one layer at most 0.
+    charge : shape (E,)
+        To be taken off the weight of arcs along each way, at least 0.
     """
-    arcs, num_vertices = layers.arcs, layers.num_vertices
-    source, target = arcs.source[which], arcs.target[which]
-    ahead, before, value, last = _forward(
-        source, target, weights, _layer_bounds(layers, source), num_vertices, num_vertices * layers.num_layers, layers.first_state
-    )
+    arcs, num_vertices, num_layers = layers.arcs, layers.num_vertices, layers.num_layers
+    tables = (which, arcs.source, arcs.target, arcs.way, weights, charge)
+    ahead, before, value, last = _forward(*tables, num_vertices, num_layers, layers.first_state)
     path: list[int] = []
     while last >= 0:
-        path.append(int(which[last]))
-        last = int(before[source[last]])
+        path.append(int(last))
+        last = int(before[arcs.source[last]])
     return Longest(float(value), np.array(path[::-1], dtype=np.int64), ahead)
 
 
-def longest_to_end(layers: Layers, which: IntArray, weights: FloatArray) -> FloatArray:
-    """Length of the longest path from each state to an end, -inf where there is none; shape (states,)."""
-    source, target = layers.arcs.source[which], layers.arcs.target[which]
-    num_vertices = layers.num_vertices
-    bounds = _layer_bounds(layers, source)
-    return _backward(source, target, weights, bounds, num_vertices, num_vertices * layers.num_layers)
+def arcs_above(
+    layers: Layers, which: Int32Array, weights: FloatArray, charge: FloatArray, ahead: FloatArray, threshold: float
+) -> Int32Array:
+    """Those arcs that lie on a path longer than a threshold, or shorter by no more than rounding.
 
-
-def _layer_bounds(layers: Layers, source: IntArray) -> IntArray:
-    return np.searchsorted(source, layers.num_vertices * np.arange(layers.num_layers + 1))
+    Parameters
+    ----------
+    layers, which, weights, charge
+        As for `longest_path`.
+    ahead : shape (states,)
+        What that found.
+    threshold
+    """
+    arcs, num_vertices, num_layers = layers.arcs, layers.num_vertices, layers.num_layers
+    tables = (which, arcs.source, arcs.target, arcs.way, weights, charge)
+    return which[_on_long_paths(*tables, num_vertices, num_layers, ahead, threshold)]
 
 
 @compiled
 def _forward(
-    source: IntArray,
-    target: IntArray,
+    which: Int32Array,
+    source: Int32Array,
+    target: Int32Array,
+    way: Int32Array,
     weights: FloatArray,
-    bounds: IntArray,
+    charge: FloatArray,
     num_vertices: int,
-    num_states: int,
+    num_layers: int,
     first_state: int,
-) -> tuple[FloatArray, IntArray, float, int]:
-    best, before = np.empty(num_states), np.empty(num_states, np.int64)
+) -> tuple[FloatArray, Int32Array, float, int]:
+    num_states = num_vertices * num_layers
+    best, before = np.empty(num_states), np.empty(num_states, np.int32)
     for s in range(num_states):
         best[s], before[s] = -np.inf, -1
     best[first_state] = 0.0
-    value, last = -np.inf, -1
-    for k in range(len(bounds) - 1):
+    value, last, begin = -np.inf, -1, 0
+    for k in range(num_layers):
         top = (k + 1) * num_vertices
-        again = True
-        while again:  # arcs within the layer
-            again = False
-            for a in range(bounds[k], bounds[k + 1]):
+        end, inner = begin, False
+        while end < len(which) and source[which[end]] < top:
+            inner = inner or 0 <= target[which[end]] < top
+            end += 1
+        while inner:  # arcs within the layer
+            inner = False
+            for i in range(begin, end):
+                a = which[i]
                 to = target[a]
-                if 0 <= to < top and best[source[a]] + weights[a] > best[to]:
-                    best[to], before[to] = best[source[a]] + weights[a], a
-                    again = True
-        for a in range(bounds[k], bounds[k + 1]):
-            to, length = target[a], best[source[a]] + weights[a]
+                if 0 <= to < top:
+                    length = best[source[a]] + (weights[i] - charge[way[a]])
+                    if length > best[to]:
+                        best[to], before[to] = length, a
+                        inner = True
+        for i in range(begin, end):
+            a = which[i]
+            to, length = target[a], best[source[a]] + weights[i]
+            if way[a] >= 0:
+                length -= charge[way[a]]
             if to < 0:
                 if length > value:
                     value, last = length, a
             elif to >= top and length > best[to]:
                 best[to], before[to] = length, a
+        begin = end
     return best, before, value, last
 
 
 @compiled
-def _backward(
-    source: IntArray, target: IntArray, weights: FloatArray, bounds: IntArray, num_vertices: int, num_states: int
-) -> FloatArray:
-    best = np.empty(num_states)
-    for s in range(num_states):
+def _on_long_paths(
+    which: Int32Array,
+    source: Int32Array,
+    target: Int32Array,
+    way: Int32Array,
+    weights: FloatArray,
+    charge: FloatArray,
+    num_vertices: int,
+    num_layers: int,
+    ahead: FloatArray,
+    threshold: float,
+) -> BoolArray:
+    """Dynamic programming backwards, and which arcs lie on paths that are long enough."""
+    best, kept = np.empty(num_vertices * num_layers), np.zeros(len(which), np.bool_)
+    for s in range(len(best)):
         best[s] = -np.inf
-    for k in range(len(bounds) - 2, -1, -1):
-        top = (k + 1) * num_vertices
-        for a in range(bounds[k], bounds[k + 1]):
+    end = len(which)
+    for k in range(num_layers - 1, -1, -1):
+        floor, top = k * num_vertices, (k + 1) * num_vertices
+        begin, inner = end, False
+        while begin > 0 and source[which[begin - 1]] >= floor:
+            begin -= 1
+            inner = inner or 0 <= target[which[begin]] < top
+        for i in range(begin, end):
+            a = which[i]
             to = target[a]
             if to < 0 or to >= top:
-                length = weights[a] + (0.0 if to < 0 else best[to])
+                length = weights[i] + (0.0 if to < 0 else best[to])
+                if way[a] >= 0:
+                    length -= charge[way[a]]
                 best[source[a]] = max(best[source[a]], length)
-        again = True
-        while again:
-            again = False
-            for a in range(bounds[k], bounds[k + 1]):
+        while inner:
+            inner = False
+            for i in range(begin, end):
+                a = which[i]
                 to = target[a]
-                if 0 <= to < top and best[to] + weights[a] > best[source[a]]:
-                    best[source[a]] = best[to] + weights[a]
-                    again = True
-    return best
+                if 0 <= to < top:
+                    length = best[to] + (weights[i] - charge[way[a]])
+                    if length > best[source[a]]:
+                        best[source[a]] = length
+                        inner = True
+        for i in range(begin, end):
+            a = which[i]
+            to, length = target[a], ahead[source[a]] + weights[i]
+            if to >= 0:
+                length += best[to]
+            if way[a] >= 0:
+                length -= charge[way[a]]
+            kept[i] = length > threshold - 1e-9 * (abs(threshold) + abs(weights[i]))
+        end = begin
+    return kept

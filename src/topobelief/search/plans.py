@@ -1,13 +1,12 @@
-"""What a walk, or a mixture of walks, adds to the information of the prior (docs, the mathematics, section 12).
+"""What a walk, or a mixture of walks, adds to the information of the prior (docs, the mathematics, section 13).
 
-The new pose number t = 1 … T is one variable wherever a walk has put it. With n_tj closures between it and pose j of the map and
-odometry of information V_t from the pose before, all in world twists,
+The new pose number t = 1 … T is one variable wherever a walk has put it. With n_tj closures between it and pose j of the
+map and odometry of information V_t from the pose before, all in world twists,
 
     I = I_0 + sum_t sum_j n_tj W_j (x) e(t, j) + sum_t V_t (x) e(t - 1, t),
 
-e(i, j) the Laplacian of one edge and pose 0 the one where the robot is, which is held. It is linear in (n, V): the plan of a mixture is
-the mixture of the plans.
-"""
+e(i, j) the Laplacian of one edge and pose 0 the one where the robot is, which is held. It is linear in (n, V): the plan of
+a mixture is the mixture of the plans."""
 
 from __future__ import annotations
 

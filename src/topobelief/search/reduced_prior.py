@@ -1,11 +1,12 @@
 """What a session needs to know of the prior: the joint covariance of the poses that can be seen, in world twists.
 
-A world twist xi moves a pose x to exp(xi) x, about an origin at the pose where the robot is, which is held. In it a measurement
-i -> j with noise Omega sees Ad(x_j)^-1 (xi_j - xi_i): its information W_j = Ad(x_j)^-T Omega Ad(x_j)^-1 depends on the pose where
-it ends alone (docs, the mathematics, section 12). Closures are stored new -> old, so what one adds is known before any walk is.
+A world twist xi moves a pose x to exp(xi) x, about an origin at the pose where the robot is, which is held. In it a
+measurement i -> j with noise Omega sees Ad(x_j)^-1 (xi_j - xi_i): its information W_j = Ad(x_j)^-T Omega Ad(x_j)^-1 depends
+on the pose where it ends alone (docs, the mathematics, section 13). Closures are stored new -> old, so what one adds is
+known before any walk is.
 
 For the expected error of the map, K = Sigma_mS Pi Sigma_Sm / |S| too: Sigma_mS the covariance of the seen poses with the
-positions of a sample S of the poses, Pi what is left of them after the best rigid alignment.
+positions of a sample S of the poses, Pi what is left of them after the best rigid alignment (section 12).
 """
 
 from __future__ import annotations
@@ -18,10 +19,9 @@ from topobelief.arrays import FloatArray, IntArray
 from topobelief.errors import IllConditionedError
 from topobelief.forms.prior_factors import PriorFactors
 from topobelief.geometry import Group
+from topobelief.graph.alignment import DEFAULT_SAMPLE_SIZE, Alignment
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg.elimination_paths import FormFactor
-
-_LARGEST_SAMPLE = 500  # poses whose error counts
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +89,8 @@ def reduced_prior(
     factor = PriorFactors(graph, pose).factor("joint", 0.0)
     if not np.isfinite(factor.log_det.error):
         raise IllConditionedError("covariance of the map", factor.log_det.error)
-    sample = map_sample(graph.num_poses) if with_errors else np.zeros(0, dtype=np.int64)
+    alignment = Alignment.of(graph.positions, DEFAULT_SAMPLE_SIZE)
+    sample = alignment.nodes if with_errors else np.zeros(0, dtype=np.int64)
     wanted = np.union1d(seen, sample)
     rows = _inverse_root(factor, wanted)  # covariance of the wanted poses is rows rows^T, in (dp, dphi)
     group, kappa, k = graph.group, graph.tangent_dim, graph.group.position_dim
@@ -98,7 +99,7 @@ def reduced_prior(
     kernel, mean_square = None, np.nan
     if with_errors:
         positions = rows[np.searchsorted(wanted, sample), :k].reshape(len(sample) * k, -1)
-        aligned = without_rigid_motion(graph.positions[sample], positions)
+        aligned = alignment.columns(k)[:, :k].reshape(len(positions), -1) @ positions
         mean_square = float(np.sum(aligned**2)) / len(sample)
         mixed = flat @ aligned.T
         kernel = mixed @ mixed.T / len(sample)
@@ -113,33 +114,6 @@ def reduced_prior(
         kernel,
         mean_square,
     )
-
-
-def map_sample(num_poses: int) -> IntArray:
-    """Poses whose error counts: all of them, or as many as are at most sampled, evenly spaced along the trajectory."""
-    return np.unique(np.linspace(0, num_poses - 1, min(num_poses, _LARGEST_SAMPLE)).round().astype(np.int64))
-
-
-def without_rigid_motion(positions: FloatArray, columns: FloatArray) -> FloatArray:
-    """Pi X: columns of displacements of some positions less what a rigid motion of them all explains best.
-
-    Parameters
-    ----------
-    positions : shape (n, k)
-    columns : shape (n k, c)
-    """
-    count, k = positions.shape
-    centred = positions - positions.mean(axis=0)
-    turns: list[FloatArray] = []
-    for a in range(k):
-        for b in range(a + 1, k):
-            turn = np.zeros((count, k))
-            turn[:, a], turn[:, b] = -centred[:, b], centred[:, a]
-            turns.append(turn.ravel())
-    shifts = [np.tile(axis, count) for axis in np.eye(k)]
-    basis, scale, _ = np.linalg.svd(np.stack([*shifts, *turns], axis=1), full_matrices=False)
-    basis = basis[:, scale > 1e-9 * scale[0]]
-    return columns - basis @ (basis.T @ columns)
 
 
 def to_twists(group: Group, offsets: FloatArray) -> FloatArray:

@@ -1,13 +1,14 @@
 """What the arcs of the layers are worth to a gain's slopes, and the plan that a path through them is.
 
-A new pose anywhere on a piece of a way is covered in two steps. It closes loops with poses that its piece sees: with all of them
-or, where at most k are allowed, with k of them; slopes are never negative, so the k largest are an upper bound. Its odometry
+A new pose anywhere on a piece of a way is covered in two steps. It closes loops with poses that its piece sees: with all of
+them or, where at most k are allowed, with k of them; slopes are never negative, so the k largest are an upper bound. Its
+odometry
 
     V(u) = (A_0 + u N A_0)^T Omega (A_0 + u N A_0),   A_0 = Ad(x)^-1 at the beginning of the way, N = Ad(exp(-e_x)) - I,
 
-u metres further along the way, is a convex function of u: it lies below the chord between the ends of the piece. So a mixture of
-two plans, one with each end's odometry, has no less information than the walk, and one of the two is worth as much.
-"""
+u metres further along the way, is a convex function of u: it lies below the chord between the ends of the piece. So a
+mixture of two plans, one with each end's odometry, has no less information than the walk, and one of the two is worth as
+much."""
 
 from __future__ import annotations
 
@@ -17,9 +18,10 @@ import numpy as np
 
 from topobelief.arrays import BoolArray, FloatArray, IntArray
 from topobelief.geometry import Group
+from topobelief.linalg.block_cholesky import Int32Array
 from topobelief.linalg.compiled import compiled
 from topobelief.search.information_gain import Slopes
-from topobelief.search.layers import Arcs, Layers, Records
+from topobelief.search.layers import Arcs, Layers
 from topobelief.search.plans import Plan
 from topobelief.search.reduced_prior import world_to_body
 from topobelief.search.ways import Sightings, Ways
@@ -78,7 +80,7 @@ class Rewards:
     driven: FloatArray
     prices: FloatArray
 
-    def of_records(self, slopes: Slopes, used: IntArray) -> FloatArray:
+    def of_records(self, slopes: Slopes, used: Int32Array) -> FloatArray:
         """Worth of some records, in a table of all of them."""
         worth = np.empty(len(self.layers.records.number))
         on_ways = np.einsum("tab,ceab->cte", slopes.odometry, self.powers)
@@ -89,7 +91,7 @@ class Rewards:
         )  # fmt: skip
         return worth
 
-    def of_arcs(self, worth: FloatArray, which: IntArray, slopes: Slopes, price: float, toll: float, at_end: FloatArray) -> FloatArray:
+    def of_arcs(self, worth: FloatArray, which: Int32Array, slopes: Slopes, price: float, at_end: FloatArray) -> FloatArray:
         """Weights of some arcs.
 
         Parameters
@@ -100,14 +102,12 @@ class Rewards:
         slopes
         price
             Worth of one unit of cost.
-        toll
-            Worth of one metre, beyond its cost.
         at_end : shape (T + 1,)
             What ends a walk after each number of poses.
         """
         idle = np.einsum("tab,ab->t", slopes.odometry, self.idle)
         remaining = np.concatenate([np.cumsum(idle[::-1])[::-1], np.zeros(1)])
-        arcs, charge = self.layers.arcs, price * self.prices + toll * self.driven
+        arcs, charge = self.layers.arcs, price * self.prices
         return _value_arcs(which, arcs.way, arcs.record, arcs.count, arcs.end, arcs.last, worth, charge, remaining + at_end)
 
     def course(self, path: IntArray, slopes: Slopes) -> Course:
@@ -130,11 +130,13 @@ class Rewards:
             if self.most and len(seen) > self.most:
                 seen = seen[np.argsort(-slopes.closures[t - 1, seen], kind="stable")[: self.most]]
             closures[t - 1, seen] = 1.0
-            ends = self._odometry_at(e, piece)
-            odometry[t - 1] = max(ends, key=lambda end: float(np.vdot(slopes.odometry[t - 1], end)))
+            ends = np.array(self._odometry_at(e, piece))
+            odometry[t - 1] = ends[np.argmax(np.tensordot(ends, slopes.odometry[t - 1], 2))]
         ways = arcs.way[path]
         ways = ways[ways >= 0]
-        plan = Plan(closures, odometry, float(arcs.last[path[-1]]), float(self.driven[ways].sum()), float(self.prices[ways].sum()))
+        plan = Plan(
+            closures, odometry, float(arcs.last[path[-1]]), float(self.driven[ways].sum()), float(self.prices[ways].sum())
+        )
         return Course(path, records, plan)
 
     def _odometry_at(self, way: int, piece: int) -> list[FloatArray]:
@@ -165,18 +167,18 @@ def odometry_powers(group: Group, poses: FloatArray, origin: FloatArray, informa
     return np.stack([turned @ matrix @ at_begin for matrix in (information, middle, shear.T @ information @ shear)])
 
 
-def used_records(arcs: Arcs, which: IntArray, num_records: int) -> IntArray:
+def used_records(arcs: Arcs, which: Int32Array, num_records: int) -> Int32Array:
     """Records of some arcs, each once."""
-    return np.flatnonzero(_marked(which, arcs.record, arcs.count, arcs.end, num_records))
+    return np.flatnonzero(_marked(which, arcs.record, arcs.count, arcs.end, num_records)).astype(np.int32)
 
 
-def allowed_arcs(arcs: Arcs, which: IntArray, allowed: BoolArray) -> IntArray:
+def allowed_arcs(arcs: Arcs, which: Int32Array, allowed: BoolArray) -> Int32Array:
     """Those arcs all of whose records are allowed."""
     return which[_all_allowed(which, arcs.record, arcs.count, arcs.end, allowed)]
 
 
 @compiled
-def _marked(which: IntArray, record: IntArray, count: IntArray, end: IntArray, num_records: int) -> BoolArray:
+def _marked(which: Int32Array, record: Int32Array, count: Int32Array, end: Int32Array, num_records: int) -> BoolArray:
     marked = np.zeros(num_records, np.bool_)
     for a in which:
         for r in range(record[a], record[a] + count[a]):
@@ -187,7 +189,7 @@ def _marked(which: IntArray, record: IntArray, count: IntArray, end: IntArray, n
 
 
 @compiled
-def _all_allowed(which: IntArray, record: IntArray, count: IntArray, end: IntArray, allowed: BoolArray) -> BoolArray:
+def _all_allowed(which: Int32Array, record: Int32Array, count: Int32Array, end: Int32Array, allowed: BoolArray) -> BoolArray:
     result = np.zeros(len(which), np.bool_)
     for i in range(len(which)):
         a = which[i]
@@ -200,10 +202,10 @@ def _all_allowed(which: IntArray, record: IntArray, count: IntArray, end: IntArr
 
 @compiled
 def _value_records(
-    used: IntArray,
-    number: IntArray,
-    way: IntArray,
-    piece: IntArray,
+    used: Int32Array,
+    number: Int32Array,
+    way: Int32Array,
+    piece: Int32Array,
     lengths: FloatArray,
     delta: float,
     on_ways: FloatArray,
@@ -248,12 +250,12 @@ def _value_records(
 
 @compiled
 def _value_arcs(
-    which: IntArray,
-    way: IntArray,
-    record: IntArray,
-    count: IntArray,
-    end: IntArray,
-    last: IntArray,
+    which: Int32Array,
+    way: Int32Array,
+    record: Int32Array,
+    count: Int32Array,
+    end: Int32Array,
+    last: Int32Array,
     worth: FloatArray,
     charge: FloatArray,
     remaining: FloatArray,

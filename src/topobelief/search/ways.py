@@ -1,11 +1,11 @@
 """Directed ways of a roadmap that a walk may drive, and which poses of the map are seen along them.
 
-The way of an edge is cut into pieces of length delta, measured from where it begins. A new pose that stands somewhere on piece
-i = 1 … N, or at the very end of the way (piece N + 1), may close loops with the poses that some place of the piece sees: a
-superset of what it will see where it really stands. With at most k closures a pose, the k nearest and no two beside each other
-on the odometry chain, only poses that may be among them count: those of which the nearest place of the piece is no further than
-the furthest one of the (3 k - 2)-nd pose that the whole piece sees, because k - 1 poses and the two neighbours of each are fewer.
-"""
+The way of an edge is cut into pieces of length delta, measured from where it begins. A new pose that stands somewhere on
+piece i = 1 … N, or at the very end of the way (piece N + 1), may close loops with the poses that some place of the piece
+sees: a superset of what it will see where it really stands. With at most k closures a pose, the k nearest and no two beside
+each other on the odometry chain, only poses that may be among them count: those of which the nearest place of the piece is
+no further than the furthest one of the (3 k - 2)-nd pose that the whole piece sees, because k - 1 poses and the two
+neighbours of each are fewer."""
 
 from __future__ import annotations
 
@@ -137,7 +137,10 @@ def _seen_along(
     if world is not None:
         parts = seen_parts(world, positions[seen], ways.begin[way], ways.end[way])
         length = ways.lengths[way][parts.which]
-        lower, upper = np.maximum(lower[parts.which], parts.lower * length), np.minimum(upper[parts.which], parts.upper * length)
+        lower, upper = (
+            np.maximum(lower[parts.which], parts.lower * length),
+            np.minimum(upper[parts.which], parts.upper * length),
+        )
         way, seen = way[parts.which], seen[parts.which]
         overlap = lower <= upper
         way, seen, lower, upper = way[overlap], seen[overlap], lower[overlap], upper[overlap]

@@ -1,0 +1,331 @@
+"""The bound over all walks of a roadmap by flows (docs, the mathematics, section 13).
+
+Walks are paths through layers (`layers`), a mixture of walks is a flow through them, and the gain is a concave function of
+the flow. Frank-Wolfe: at a flow x the longest path for the gradient is a walk, and no walk gains more than the linear
+function says there. The walks found are an active set whose weights are optimised anew at each step.
+
+Flows are in many corridors at once. So the walks are split: those whose t-th new pose stands on one side of a line, and
+those for which it is on the other side. Each part has flows of its own; the least of their bounds is the bound of all."""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from topobelief.arrays import FloatArray, IntArray
+from topobelief.linalg.block_cholesky import Int32Array
+from topobelief.search.criteria import Criterion
+from topobelief.search.cuts import best_line, best_place
+from topobelief.search.information_gain import gain_and_slopes
+from topobelief.search.layers import arcs_above, longest_path
+from topobelief.search.plans import Plan, mixture
+from topobelief.search.reduced_prior import ReducedPrior
+from topobelief.search.rewards import Course, Rewards, allowed_arcs, used_records
+from topobelief.search.weights import best_weights
+
+_SAME_PLACE = 1e-9  # metres
+_ROUNDING = 1e-9  # relative; bounds are lowered by it
+_LARGEST_SET = 40  # walks whose weights are optimised
+_TOLL_TRIALS = 2  # longest paths a step, to find the price of a metre
+_STEPS_BEFORE_SPLIT = 3
+_SLOW = 0.15  # of what is missing to the best value: a part whose bound rises by less a step is split
+_CONVERGED = 0.25  # of what is missing: a part whose own optimum is known as well as that is split
+_SLOW_STEPS = 4  # after so many, a part that cannot be split is left as it is
+_LEAST_WEIGHT = 1e-3  # of walks that count where parts are split
+
+
+@dataclass(eq=False, slots=True)
+class _Part:
+    """Some of the walks: those on paths of these arcs."""
+
+    arcs: Int32Array
+    records: Int32Array  # of the arcs, each once
+    courses: list[Course] = field(default_factory=list["Course"])
+    weights: FloatArray = field(default_factory=lambda: np.zeros(0))
+    bound: float = -math.inf
+    toll: float = 0.0
+    ahead: float = 0.0  # D at the longest path
+    steps: int = 0
+    fresh: int = 0  # steps since it was made
+    slow: int = 0  # latest steps in a row that hardly raised the bound
+
+
+class FlowBound:
+    """Lower bound of the objective over the walks of a roadmap; see `WalkBound` and `flow_bound`."""
+
+    def __init__(
+        self, prior: ReducedPrior, criterion: Criterion, rewards: Rewards, vertices: IntArray, max_length: float, covers: str
+    ) -> None:
+        self._prior, self._criterion, self._rewards = prior, criterion, rewards
+        self._vertices, self._max_length, self._covers = vertices, max_length, covers
+        self._best = math.inf
+        self._closed = math.inf  # least bound of the parts that cannot be split
+        self._bound = -math.inf
+        self._counter = itertools.count()
+        arcs = rewards.layers.arcs
+        every = np.arange(len(arcs.source), dtype=np.int32)
+        whole = _Part(every, used_records(arcs, every, len(rewards.layers.records.number)))
+        self._open: list[tuple[float, int, _Part]] = [(-math.inf, next(self._counter), whole)]
+        self._begin, self._end = rewards.places()
+        self._num_arcs = len(every)
+        self.num_steps = 0
+
+    @property
+    def lower_bound(self) -> float:
+        return self._bound
+
+    @property
+    def covers(self) -> str:
+        return self._covers
+
+    @property
+    def finished(self) -> bool:
+        return not self._open
+
+    @property
+    def share_ruled_out(self) -> float:
+        """Share of the layers' arcs that lie on no walk which may be better than the best one known."""
+        kept = np.zeros(self._num_arcs, dtype=bool)
+        for _, _, part in self._open:
+            kept[part.arcs] = True
+        return 1 - float(kept.mean()) if len(kept) else 0.0
+
+    @property
+    def num_parts(self) -> int:
+        """Into how many parts the walks that may be better than the best one known are split."""
+        return len(self._open)
+
+    def prune(self, best_value: float) -> None:
+        self._best = min(self._best, best_value)
+        self._criterion = self._criterion.compared_with(self._best)
+        self._open = [entry for entry in self._open if entry[0] < self._best]
+        heapq.heapify(self._open)
+        self._update()
+
+    def step(self) -> list[IntArray]:
+        if not self._open:
+            return []
+        _, _, part = heapq.heappop(self._open)
+        parts = [part]
+        if part.fresh >= _STEPS_BEFORE_SPLIT and part.slow:
+            halves = self._split(part)
+            if halves is not None:
+                parts = halves
+            elif part.slow >= _SLOW_STEPS:
+                self._closed = min(self._closed, part.bound)
+                parts = []
+        found: list[IntArray] = []
+        for each in parts:
+            found.extend(self._improved(each))
+            if len(each.arcs) and each.bound < self._best:
+                heapq.heappush(self._open, (each.bound, next(self._counter), each))
+        self.num_steps += 1
+        self._update()
+        return found
+
+    def _update(self) -> None:
+        least = min((entry[0] for entry in self._open), default=math.inf)
+        bound = min(least, self._best, self._closed)
+        if bound > self._bound and bound < math.inf:
+            self._bound = bound
+
+    def _improved(self, part: _Part) -> list[IntArray]:
+        """One step of Frank-Wolfe on a part: its bound, its walks, their weights."""
+        criterion, rewards = self._criterion, self._rewards
+        layers = rewards.layers
+        plan = mixture([course.plan for course in part.courses], part.weights) if part.courses else self._nothing()
+        gain, slopes = gain_and_slopes(self._prior, criterion.kind, plan)
+        offset = slopes.of(plan)
+        priced = bool(rewards.prices.any()) or criterion.counts_poses
+        rate = criterion.least_rate(gain, part.ahead) if priced else 1.0
+        worth = rewards.of_records(slopes, part.records)
+        at_end = -criterion.at_end() / rate if priced else np.zeros(rewards.num_new + 1)
+        price = criterion.price / rate if priced else 0.0
+        best: tuple[float, FloatArray, float] | None = None  # D less linear terms, lengths ahead, toll
+        found: list[Course] = []
+        lines: list[tuple[float, float]] = []  # a path's worth without toll, and its length
+        toll = part.toll
+        weights = rewards.of_arcs(worth, part.arcs, slopes, price, at_end)
+        for _ in range(_TOLL_TRIALS):
+            longest = longest_path(layers, part.arcs, weights, toll * rewards.driven)
+            if longest.value == -math.inf:
+                part.bound, part.arcs = math.inf, part.arcs[:0]
+                return []
+            total = longest.value - offset + toll * self._max_length
+            course = rewards.course(longest.arcs, slopes)
+            if best is None or total < best[0]:
+                best = total, longest.ahead, toll
+            found.append(course)
+            lines.append((longest.value + toll * course.plan.length, course.plan.length))
+            following = self._next_toll(lines, toll)
+            if following is None:
+                break
+            toll = following
+        assert best is not None
+        total, lengths, part.toll = best
+        part.ahead = total if not priced else max(slopes.of(found[-1].plan) - offset, 0.0)
+        if priced:
+            ahead = part.ahead if part.steps else 0.0
+            rate_now = criterion.least_rate(gain, ahead)
+            ahead = ahead if abs(rate_now - rate) <= 1e-12 * rate else self._tangent(gain, rate)
+            bound = criterion.least(gain, ahead) + rate * (ahead - total)
+            threshold = ahead + (criterion.least(gain, ahead) - criterion.from_objective(self._best)) / rate
+        else:
+            bound = criterion.least(gain, total)
+            threshold = criterion.needed(gain, self._best) if math.isfinite(self._best) else -math.inf
+        value = criterion.to_objective(criterion.of_gain(gain) + criterion.linear(plan))
+        bound = criterion.to_objective(bound)
+        bound -= _ROUNDING * (abs(bound) + abs(criterion.of_gain(0.0)))
+        missing = self._best - part.bound
+        known = math.isfinite(missing)
+        slow = bound - part.bound < _SLOW * (missing if known else value - part.bound)
+        slow = slow or (known and value - bound < _CONVERGED * (self._best - bound))
+        part.slow = part.slow + 1 if slow else 0
+        part.bound = max(part.bound, bound)
+        if math.isfinite(threshold):
+            self._thin(part, weights, lengths, threshold + offset - part.toll * self._max_length)
+        part.steps += 1
+        part.fresh += 1
+        self._reweigh(part, found)
+        return [walk for walk in map(self._walk, found) if walk is not None]
+
+    def _tangent(self, gain: float, rate: float) -> float:
+        """D at which the least value falls as fast as `rate`."""
+        criterion = self._criterion
+        if criterion.kind == "error":
+            left = criterion.start - gain
+            return left * ((2 * rate * math.sqrt(left)) ** (-2 / 3) - 1)
+        return criterion.size / 2 * (1 / rate - 1)
+
+    def _next_toll(self, lines: list[tuple[float, float]], toll: float) -> float | None:
+        """The price of a metre to try next: where the best too long path and the best one within the length tie."""
+        worth, length = lines[-1]
+        slack = _SAME_PLACE + _ROUNDING * self._max_length
+        if length <= self._max_length + slack and toll == 0.0:
+            return None
+        over = [line for line in lines if line[1] > self._max_length + slack]
+        within = [line for line in lines if line[1] <= self._max_length + slack]
+        if not over:
+            return 0.0 if len(lines) == 1 else None
+        longest = max(over, key=lambda line: line[0] - toll * line[1])
+        if not within:
+            excess = longest[1] - self._max_length
+            return 2 * toll if toll else 0.1 * max(abs(worth), 1e-300) / max(self._max_length, excess)
+        shortest = max(within, key=lambda line: line[0] - toll * line[1])
+        following = (longest[0] - shortest[0]) / (longest[1] - shortest[1])
+        return following if following > 0 and abs(following - toll) > 1e-3 * toll else None
+
+    def _thin(self, part: _Part, weights: FloatArray, ahead: FloatArray, threshold: float) -> None:
+        """Leave out arcs on no path that is longer than a threshold."""
+        layers = self._rewards.layers
+        kept = arcs_above(layers, part.arcs, weights, part.toll * self._rewards.driven, ahead, threshold)
+        if len(kept) < len(part.arcs):
+            part.arcs = kept
+            part.records = used_records(layers.arcs, kept, len(layers.records.number))
+
+    def _reweigh(self, part: _Part, found: list[Course]) -> None:
+        """Add walks to the active set and optimise all weights: a concave function over a simplex."""
+        used = part.weights > 1e-4
+        courses = [course for course, keep in zip(part.courses, used, strict=True) if keep] + found
+        part.courses = courses[-_LARGEST_SET:]
+        start = np.concatenate([part.weights[used], np.zeros(len(found))])[-_LARGEST_SET:]
+        start = start / start.sum() if start.sum() > 0 else np.full(len(start), 1 / len(start))
+        plans = [course.plan for course in part.courses]
+        lengths = np.array([plan.length for plan in plans])
+        touched = np.flatnonzero(np.array([plan.closures.any(axis=0) for plan in plans]).any(axis=0))
+        criterion = self._criterion
+        linear = np.array([criterion.linear(plan) for plan in plans])
+        scale = 1e-2 * max(abs(criterion.of_gain(0.0)), 1e-300) if criterion.kind == "error" else 1.0
+
+        def value(weights: FloatArray) -> tuple[float, FloatArray]:
+            gained, slopes = gain_and_slopes(self._prior, criterion.kind, mixture(plans, weights), among=touched)
+            gradient = linear - criterion.rate(gained) * np.array([slopes.of(plan) for plan in plans])
+            return (criterion.of_gain(gained) + float(linear @ weights)) / scale, gradient / scale
+
+        part.weights = best_weights(value, start, lengths, max(self._max_length, float(lengths.min())))
+
+    def _nothing(self) -> Plan:
+        """A plan to begin with: no closures, and odometry as on the first way."""
+        rewards = self._rewards
+        closures = np.zeros((rewards.num_new, len(self._prior.closures)))
+        odometry = np.broadcast_to(rewards.powers[0, 0], (rewards.num_new, *rewards.idle.shape)).copy()
+        return Plan(closures, odometry, 0.0, 0.0, 0.0)
+
+    def _walk(self, course: Course) -> IntArray | None:
+        """The vertices of a walk within the length, or None."""
+        if course.plan.length > self._max_length + _SAME_PLACE:
+            return None
+        ways = self._rewards.layers.arcs.way[course.arcs]
+        targets = self._rewards.ways.target[ways[ways >= 0]]
+        places = np.concatenate([[self._rewards.layers.first_state], targets])
+        vertices = self._vertices[places]
+        return vertices[vertices >= 0]
+
+    def _split(self, part: _Part) -> list[_Part] | None:
+        """Two parts of the walks, by what separates the weight of the active set best; None where its walks agree.
+
+        That is the side of a line on which one of the new poses stands, or the number of new poses.
+        """
+        layers = self._rewards.layers
+        line, count = self._dividing_line(part), self._dividing_number(part)
+        if line is None and count is None:
+            return None
+        if count is None or (line is not None and line[0] >= count[0]):
+            assert line is not None
+            _, number, normal, at = line
+            is_it = layers.records.number == number
+            one, other = self._begin @ normal, self._end @ normal
+            kept = [
+                allowed_arcs(layers.arcs, part.arcs, ~is_it | side)
+                for side in (np.minimum(one, other) <= at, np.maximum(one, other) >= at)
+            ]
+        else:
+            last = layers.arcs.last[part.arcs]
+            kept = [part.arcs[(last < 0) | (last <= count[1])], part.arcs[(last < 0) | (last > count[1])]]
+        return [self._restricted(part, arcs) for arcs in kept]
+
+    def _restricted(self, part: _Part, arcs: Int32Array) -> _Part:
+        """The walks of a part that take these arcs only."""
+        layers = self._rewards.layers
+        within = np.array([bool(np.isin(course.arcs, arcs, assume_unique=True).all()) for course in part.courses], dtype=bool)
+        courses = [course for course, keep in zip(part.courses, within, strict=True) if keep]
+        weights = part.weights[within]
+        total = float(weights.sum())
+        weights = weights / total if total > 0 else np.full(len(courses), 1 / max(len(courses), 1))
+        records = used_records(layers.arcs, arcs, len(layers.records.number))
+        return _Part(arcs, records, courses, weights, part.bound, part.toll)
+
+    def _dividing_line(self, part: _Part) -> tuple[float, int, FloatArray, float] | None:
+        """Score, number of a new pose, unit vector, and where along it to cut."""
+        records = self._rewards.layers.records
+        middle = (self._begin + self._end) / 2
+        best: tuple[float, int, FloatArray, float] | None = None
+        numbers = [records.number[course.records] for course in part.courses]
+        for t in range(1, self._rewards.num_new + 1):
+            places: list[FloatArray] = []
+            weights: list[float] = []
+            for course, number, weight in zip(part.courses, numbers, part.weights.tolist(), strict=True):
+                at = np.flatnonzero(number == t)
+                if at.size and weight > _LEAST_WEIGHT:
+                    places.append(middle[course.records[at[0]]])
+                    weights.append(weight)
+            if len(places) < 2:
+                continue
+            cut = best_line(np.array(places), np.array(weights), self._rewards.delta)
+            if cut is not None and (best is None or cut[0] > best[0]):
+                best = cut[0], t, cut[1], cut[2]
+        return best
+
+    def _dividing_number(self, part: _Part) -> tuple[float, int] | None:
+        """Score, and up to how many new poses the walks of one side have."""
+        used = part.weights > _LEAST_WEIGHT
+        number = np.array([course.plan.num_poses for course, keep in zip(part.courses, used, strict=True) if keep])
+        if len(number) < 2 or np.ptp(number) == 0:
+            return None
+        spacing = self._rewards.delta * self._rewards.layers.pieces_per_pose
+        cut = best_place(spacing * number, part.weights[used], 0.5 * spacing)
+        return None if cut is None else (cut[0], math.floor(cut[1] / spacing))
