@@ -45,15 +45,14 @@ def a_session(seed, *, group=SE2_GROUP, kind="equal", num_poses=30, num_actions=
 @given(sessions(**MODERATE), st.sampled_from([ScratchEngine, IncrementalEngine]), samples, seeds)
 def test_all_quantities_are_those_of_dense_numpy(session, kind, sample_size, seed):
     graph, actions = session.graph, session.actions
+    assume(graph.num_poses > 1)  # the error of a single pose is the root of what rounding leaves of 0
     anchor = int(np.random.default_rng(seed).integers(graph.num_poses))
     found, dense = (judge(graph, each, anchor=anchor, sample_size=sample_size, **ERROR) for each in (kind, DenseEngine))
     for ours, theirs in ((found.signatures, dense.signatures), (found.entropies, dense.entropies)):
         np.testing.assert_allclose(ours(actions)[0], theirs(actions)[0], rtol=1e-7, atol=1e-10)
     if kind is ScratchEngine:  # by increments they are exact
         fischer = [forms_bounds(dense, action) for action in actions]
-        np.testing.assert_allclose(
-            np.array(found.bounds(actions)).T, fischer, rtol=1e-6, atol=1e-6 * found.bounds(actions)[1][:, None]
-        )
+        np.testing.assert_allclose(np.array(found.bounds(actions)).T, fischer, rtol=1e-6)
 
 
 def forms_bounds(dense, action):
@@ -245,19 +244,14 @@ def test_an_action_beyond_double_precision_is_named():
     far = [[1e14, 0, 0], [2e14, 0, 0]]
     hopeless = Action(far, [(n - 1, n), (n, n + 1), (n + 1, n - 1), (n + 1, 3)], np.diag([1e20, 1e20, 1e-20]), label="hopeless")
     for engine in ("scratch", "incremental"):
-        try:
-            values = Planner(graph, engine=engine, **ERROR).entropies([*actions, hopeless])
-        except IllConditionedError as error:
-            assert error.unit == "m"
-            assert "action 2 ('hopeless'): expected error of the map" in str(error)
-        else:
-            assert values[2] == pytest.approx(error_reference(graph, posterior(graph, hopeless)), rel=1e-2)
+        with pytest.raises(IllConditionedError, match=r"action 2 \('hopeless'\): expected error of the map.* m\)"):
+            Planner(graph, engine=engine, **ERROR).entropies([*actions, hopeless])
 
 
 def test_the_recorded_drive_by_both_engines():
     graph = read_g2o(data_file(RECORDED))
     n, rng = graph.num_poses, np.random.default_rng(0)
-    actions = [Action(graph.poses[n - 2 :: -20] + [0.1, 0.1, 0], chain(n, rng), graph.information[0]) for _ in range(3)]
+    actions = [Action(graph.poses[n - 2 :: -20] + 0.1, chain(n, rng), graph.information[0]) for _ in range(3)]
     found, alone = (Planner(graph, engine=engine, **ERROR).entropies(actions) for engine in ("incremental", "scratch"))
     np.testing.assert_allclose(found, alone, rtol=1e-9)
 
