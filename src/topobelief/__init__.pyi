@@ -33,6 +33,7 @@ from .io.toro import read_toro as read_toro
 from .planning.decision import Decision as Decision
 from .planning.decision_quality import DecisionQuality as DecisionQuality
 from .planning.decision_quality import decision_quality as decision_quality
+from .planning.drawn_closures import drawn_values as drawn_values
 from .planning.planner import Planner as Planner
 from .position_errors import ExpectedErrors as ExpectedErrors
 from .position_errors import expected_errors as expected_errors

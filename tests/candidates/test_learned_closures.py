@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from topobelief import PoseGraph, learn_closures
+from topobelief import ClosureModel, PoseGraph, learn_closures
+from topobelief.candidates.learned_closures import num_opportunities
 from topobelief.errors import InvalidInputError
 from topobelief.world import World
 
@@ -28,8 +30,8 @@ def test_counts_radius_and_probability_are_those_of_the_history() -> None:
     graph = rounds([(i, i - 20) for i in range(20, 40, 2)])
     model = learn_closures(graph)
     assert (model.max_per_pose, model.min_index_gap, model.num_observed) == (1, 5, 10)
-    assert model.radius == pytest.approx(0.1)
-    assert model.angle == pytest.approx(0, abs=1e-9)
+    assert model.radius == pytest.approx(0.5)  # half a step of odometry, for 0.1 m are less
+    assert model.angle == pytest.approx(math.radians(15))  # for 0 are less
     wide = learn_closures(rounds([*((i, i - 20) for i in range(20, 39, 2)), (39, 20), (38, 21)]))
     assert wide.radius > 0.7
     assert wide.num_observed == 12
@@ -82,3 +84,24 @@ def test_edges_that_skip_a_pose_are_no_closures() -> None:
 def test_a_probability_that_is_none_is_refused() -> None:
     with pytest.raises(InvalidInputError, match="expected probability above 0"):
         learn_closures(rounds([]), probability=0)
+
+
+def test_of_a_known_rule_the_probability_alone_is_learned() -> None:
+    """What the rule says counts like 20 opportunities."""
+    graph = rounds([(i, i - 20) for i in range(20, 40, 2)])
+    rule = ClosureModel(radius=0.3, max_per_pose=None, probability=0.8)
+    assert num_opportunities(graph, rule) == 20
+    model = learn_closures(graph, rule=rule)
+    assert model == replace(rule, probability=(16 + 10) / (20 + 20), num_observed=10)
+    assert learn_closures(rounds([], num=20), rule=rule).probability == pytest.approx(0.8)
+    assert str(model).endswith("at least 5 steps apart, 65 % of opportunities, learned from 10 closures of this graph")
+
+
+def test_a_place_is_left_before_it_can_be_seen_again() -> None:
+    """Half a metre a step, closures 3 m apart: 7 steps straight on lead out of reach, however the last digits fall."""
+    poses = np.column_stack([np.r_[0:30, 29:-1:-1] / 2, np.r_[[0.0] * 30, [3.0] * 30], np.zeros(60)])
+    closures = [(59 - i, i) for i in range(0, 24, 2)]
+    graph = PoseGraph(poses, [*((i, i + 1) for i in range(59)), *closures], None, OMEGA)
+    model = learn_closures(graph)
+    assert model.radius == pytest.approx(3, rel=1e-5)
+    assert model.min_index_gap == 7

@@ -13,7 +13,7 @@ from topobelief import Action, PoseGraph, posterior
 from topobelief.candidates.closures import ClosureModel
 from topobelief.candidates.learned_closures import learn_closures
 from topobelief.candidates.polyline import path_length
-from topobelief.candidates.predicted_factors import default_information, predict_actions
+from topobelief.candidates.predicted_factors import closure_information, default_information, predict_actions
 from topobelief.errors import InvalidInputError, PlanningError
 from topobelief.world import World
 
@@ -352,6 +352,20 @@ class TestInformation:
         assert np.linalg.eigvalsh(median)[0] < 0
         graph = PoseGraph(np.eye(4, 3), [(0, 1), (1, 2), (2, 3)], None, chain)
         assert (default_information(graph) == chain[1]).all()
+
+    def test_of_closures_is_the_median_over_those_that_there_are(self) -> None:
+        """From ten on; the odometry's where there are fewer."""
+        graph = drive([(x, 0) for x in range(30)])
+        for count, scale in ((9, 1.0), (11, 0.25)):
+            edges = [*graph.edges.tolist(), *((i + 15, i) for i in range(count))]
+            information = np.concatenate([graph.information, np.repeat(OMEGA[None] / 4, count, axis=0)])
+            with_closures = PoseGraph(graph.poses, edges, None, information)
+            np.testing.assert_allclose(closure_information(with_closures), scale * OMEGA)
+            action = predict(with_closures, [(29, 0), (29, 1), (20, 1)], closures=ClosureModel(probability=0.5))
+            np.testing.assert_allclose(action.information[: action.num_new_poses], OMEGA[None].repeat(action.num_new_poses, 0))
+            assert action.num_closures > 0
+            for matrix in action.information[action.num_new_poses :]:
+                np.testing.assert_allclose(matrix, scale / 2 * OMEGA)
 
     def test_given_is_taken(self) -> None:
         assert (predict(drive([(0, 0), (1, 0)]), [(1, 0), (3, 0)], information=2 * OMEGA).information == 2 * OMEGA).all()

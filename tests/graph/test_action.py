@@ -200,3 +200,26 @@ def test_new_poses_get_ids_after_the_largest_or_where_there_is_room():
         graph = PoseGraph([[0, 0, 0], [1, 0, 0]], [(0, 1)], None, np.eye(3), ids=ids)
         action = Action([[2, 0, 0], [3, 0, 0]], [(1, 2), (2, 3)], np.eye(3))
         assert posterior(graph, action).ids.tolist() == [*ids, *expected]
+
+
+class TestProbabilities:
+    def test_count_closures_as_often_as_they_are_expected(self) -> None:
+        action = Action([[2, 0, 0]], [(1, 2), (2, 0), (2, 0)], np.eye(3), probabilities=[1, 0.5, 0.25])
+        assert action.probabilities.tolist() == [1, 0.5, 0.25]
+        assert (action.num_closures, action.expected_closures) == (2, 0.75)
+        certain = Action([[2, 0, 0]], [(1, 2), (2, 0)], np.eye(3))
+        assert certain.probabilities is None
+        assert certain.expected_closures == 1
+
+    @pytest.mark.parametrize(
+        ("given", "message"),
+        [
+            ([1], "a probability for each of the 2 edges, got shape"),
+            ([1, 0], "above 0"),
+            ([1, 1.1], "above 0"),
+            ([1, np.nan], "above 0"),
+        ],
+    )
+    def test_that_are_none_are_refused(self, given: list, message: str) -> None:
+        with pytest.raises(InvalidActionError, match=message):
+            Action([[2, 0, 0]], [(1, 2), (2, 0)], np.eye(3), probabilities=given)

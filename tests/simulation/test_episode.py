@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 
 from data_files import case_file
+from topobelief.candidates.closures import ClosureModel
+from topobelief.candidates.learned_closures import learn_closures
 from topobelief.simulation.episode import Episode, achieved_entropy
+from topobelief.simulation.front_end import FrontEndSettings
 from topobelief.simulation.lidar import LidarSettings
 from topobelief.simulation.metrics import run_metrics, trajectory_error
 from topobelief.simulation.noise import InjectedNoise
@@ -54,6 +57,30 @@ def test_all_goals_are_reached_without_contact(physical, seen):
     for leg in physical.legs:
         miss = np.linalg.norm(physical.truth[leg.last_pose, :2] - physical.scenario.goals[leg.goal - 1].place)
         assert miss < 0.35
+
+
+def test_closures_are_predicted_as_the_front_end_makes_them(physical):
+    """The first decision knows no closures; the second has learned from those of the first leg."""
+    first, second = physical.deliberations
+    rule = FrontEndSettings().expected_closures
+    for deliberation in (first, second):
+        model = learn_closures(deliberation.prior, world=physical.scenario.world, rule=rule)
+        for action in deliberation.actions:
+            if action.probabilities is not None:
+                assert action.probabilities[-1] == pytest.approx(model.probability)
+            turns = np.diff(np.unwrap(action.poses[:, 2]))
+            assert np.abs(turns).max(initial=0.0) <= FrontEndSettings().key_pose_angle * (1 + 1e-6)
+    assert any(action.num_closures for action in second.actions)
+
+
+def test_the_papers_closures_are_a_choice(house):
+    scenario = replace(
+        house, goals=house.goals[:1], rule=replace(house.rule, closures=ClosureModel.paper(), line_of_sight=False)
+    )
+    episode = Episode(scenario, RunOptions(seed=1))
+    record = episode.run(should_stop=lambda: True)
+    (deliberation,) = record.deliberations
+    assert all(action.probabilities is None for action in deliberation.actions)
 
 
 def test_slam_is_better_than_wheels(physical):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from topobelief.candidates.closures import ClosureModel
 from topobelief.errors import FileError, InvalidInputError
 from topobelief.simulation.scenario import Goal
 from topobelief.simulation.scenario_file import scenario_of, with_detour
@@ -48,6 +49,19 @@ def test_what_a_file_leaves_out_has_defaults(folder):
     assert scenario.rule.robot_radius == pytest.approx(0.35)
     large = scenario_of(write(folder, "map: walls.csv\nstart: [1, 1]\ngoals: [[9, 9]]\nrobot: {radius: 0.5}\n"))
     assert large.rule.robot_radius == pytest.approx(0.6)
+
+
+def test_closures_are_learned_or_those_of_the_paper(folder):
+    least = "map: walls.csv\nstart: [1, 1]\ngoals: [[9, 9]]\n"
+    for text, closures, line_of_sight in (
+        ("", None, True),
+        ("closures: learned\n", None, True),
+        ("closures: paper\n", ClosureModel.paper(), False),
+    ):
+        rule = scenario_of(write(folder, least + text)).rule
+        assert (rule.closures, rule.line_of_sight) == (closures, line_of_sight)
+    with pytest.raises(FileError, match="closures: expected one of learned, paper, got 'all'"):
+        scenario_of(write(folder, least + "closures: all\n"))
 
 
 @pytest.mark.parametrize(

@@ -12,19 +12,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import KDTree
 
-from topobelief.arrays import IntArray
+from topobelief.arrays import FloatArray, IntArray
 from topobelief.candidates.closures import ClosureModel, closing_pairs, odometry_links
 from topobelief.errors import InvalidInputError
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.world import World
 
 _REACH = 0.9  # share of the closures whose distance and angle the rule covers
+_LEAST_ANGLE = math.radians(15)
+_INCLUDED = 1e-6  # relative; what is at the quantile itself is within the rule
 _RECENT = 0.05  # share of the edges that skip a pose which may join more recent poses than the rule allows
+_KNOWN_WEIGHT = 20  # opportunities that the probability of a known front end counts for
 _LEAST_GAP, _USUAL_GAP = 2, 5  # steps
 _AT_ONCE = 2048  # poses whose pairs are held in memory together
 
 
-def learn_closures(graph: PoseGraph, *, world: World | None = None, probability: float = 0.5) -> ClosureModel:
+def learn_closures(
+    graph: PoseGraph, *, world: World | None = None, probability: float = 0.5, rule: ClosureModel | None = None
+) -> ClosureModel:
     """The closures that a graph's own front end makes, as a model of those to come.
 
     An edge counts as a closure where its poses are at least g indices apart; several between the same two poses count once.
@@ -32,7 +37,8 @@ def learn_closures(graph: PoseGraph, *, world: World | None = None, probability:
     more; but where one in twenty of the edges that skip a pose joins poses nearer in time than that, g is as small as these
     ask for, down to 2. Then
 
-    * `radius` and `angle` are the 90 % quantiles of the closures' measured distances and angles,
+    * `radius` and `angle` are the 90 % quantiles of the closures' measured distances and angles; but not less than half the
+      median step of odometry and 15 degrees, for predicted poses are not placed and turned more exactly than that,
     * `max_per_pose` is k, the mean number of closures of those poses that make any, rounded up,
     * `probability` is the mean of the beta distribution that a uniform prior becomes after m of n opportunities were taken,
       (1 + m) / (2 + n): m closures were made, and the rule with its limit of k a pose would have predicted n. Where more were
@@ -46,6 +52,9 @@ def learn_closures(graph: PoseGraph, *, world: World | None = None, probability:
         Where given, opportunities are poses that see each other in it. Learn with the world that you predict with.
     probability
         Of the model for a graph without closures, which has one closure a pose within 2 m.
+    rule
+        What is known of the front end that makes the closures: its radius, angle, gap and limit are kept, and only its
+        probability is learned, for which `rule.probability` counts like 20 opportunities (`probability` is not used then).
 
     Returns
     -------
@@ -59,19 +68,28 @@ def learn_closures(graph: PoseGraph, *, world: World | None = None, probability:
     """
     if not 0 < probability <= 1:
         raise InvalidInputError(f"expected probability above 0 and at most 1, got {probability}")
+    if rule is not None:
+        made = History.of(graph, gap=rule.min_index_gap).num_closures
+        return _with_probability(graph, rule, made, world, mean=rule.probability, weight=_KNOWN_WEIGHT)
     past = History.of(graph)
     if past.num_closures == 0:
         return ClosureModel(probability=probability, num_observed=0)
     model = ClosureModel(
-        radius=max(past.radius, np.finfo(float).tiny),
-        angle=float(np.clip(past.angle, np.finfo(float).tiny, math.pi)),
+        radius=max(past.radius, past.step / 2, np.finfo(float).tiny) * (1 + _INCLUDED),
+        angle=min(max(past.angle, _LEAST_ANGLE) * (1 + _INCLUDED), math.pi),
         min_index_gap=past.gap,
         max_per_pose=math.ceil(past.num_closures / len(np.unique(past.closures[:, 0]))),
-        num_observed=past.num_closures,
     )
+    return _with_probability(graph, model, past.num_closures, world, mean=0.5, weight=2)
+
+
+def _with_probability(
+    graph: PoseGraph, model: ClosureModel, made: int, world: World | None, *, mean: float, weight: float
+) -> ClosureModel:
+    """The model with the mean of the beta distribution that one of a mean, worth so many opportunities, becomes."""
     opportunities = num_opportunities(graph, model, world=world)
-    taken = min(past.num_closures, opportunities)
-    return replace(model, probability=(1 + taken) / (2 + opportunities))
+    taken = min(made, opportunities)
+    return replace(model, probability=(weight * mean + taken) / (weight + opportunities), num_observed=made)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -84,14 +102,20 @@ class History:
         Least difference of the indices of their poses.
     closures : shape (C, 2)
         Later pose, earlier pose; each pair once, sorted.
+    edges : shape (C,)
+        The first edge of the graph that measures each.
     radius, angle
         Which 90 % of them do not exceed as measured, metres and radians; nan where there are none.
+    step
+        Median length of the odometry, metres; 0 where there is none.
     """
 
     gap: int
     closures: IntArray
+    edges: IntArray
     radius: float
     angle: float
+    step: float
 
     @property
     def num_closures(self) -> int:
@@ -99,25 +123,33 @@ class History:
         return len(self.closures)
 
     @classmethod
-    def of(cls, graph: PoseGraph) -> History:
-        """That of a graph."""
+    def of(cls, graph: PoseGraph, *, gap: int | None = None) -> History:
+        """That of a graph, by a gap that is known or as `learn_closures` finds it."""
         late, early = graph.edges.max(axis=1, initial=0), graph.edges.min(axis=1, initial=graph.num_poses)
         apart = late - early
         distances = np.linalg.norm(graph.group.position(graph.measurements), axis=1)
-        angles = np.linalg.norm(graph.group.rotation_vector(graph.measurements), axis=1)
-        skipping = apart[apart > 1]
-        seen = int(np.quantile(skipping, _RECENT, method="lower")) if skipping.size else _USUAL_GAP
-        gap = max(_LEAST_GAP, min(seen, _USUAL_GAP))
         step = float(np.median(distances[apart == 1])) if (apart == 1).any() else 0.0
-        if step > 0 and (apart >= gap).any():
-            radius = float(np.quantile(distances[apart >= gap], _REACH))
-            gap = max(gap, min(seen, math.ceil(radius / step) + 1))
+        if gap is None:
+            gap = _usual_gap(apart, distances, step)
         closing = np.flatnonzero(apart >= gap)
-        if closing.size == 0:
-            return cls(gap, np.zeros((0, 2), dtype=np.int64), math.nan, math.nan)
         pairs, first = np.unique(np.stack([late[closing], early[closing]], axis=1), axis=0, return_index=True)
         edges = closing[first]
-        return cls(gap, pairs, float(np.quantile(distances[edges], _REACH)), float(np.quantile(angles[edges], _REACH)))
+        if edges.size == 0:
+            return cls(gap, pairs.reshape(0, 2), edges, math.nan, math.nan, step)
+        angles = np.linalg.norm(graph.group.rotation_vector(graph.measurements[edges]), axis=1)
+        radius, angle = (float(np.quantile(values, _REACH)) for values in (distances[edges], angles))
+        return cls(gap, pairs, edges, radius, angle, step)
+
+
+def _usual_gap(apart: IntArray, distances: FloatArray, step: float) -> int:
+    """g of `learn_closures`, from all edges and the median step of odometry."""
+    skipping = apart[apart > 1]
+    seen = int(np.quantile(skipping, _RECENT, method="lower")) if skipping.size else _USUAL_GAP
+    gap = max(_LEAST_GAP, min(seen, _USUAL_GAP))
+    if step > 0 and (apart >= gap).any():
+        radius = float(np.quantile(distances[apart >= gap], _REACH))
+        gap = max(gap, min(seen, math.ceil(radius / step) + 1))
+    return gap
 
 
 def num_opportunities(graph: PoseGraph, model: ClosureModel, *, world: World | None = None) -> int:

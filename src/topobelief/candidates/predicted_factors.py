@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from topobelief.arrays import FloatArray
 from topobelief.candidates.closures import ClosureModel, closures_of_paths
-from topobelief.candidates.learned_closures import learn_closures
+from topobelief.candidates.learned_closures import History, learn_closures
 from topobelief.candidates.new_poses import poses_along
 from topobelief.candidates.polyline import checked_path, path_length
 from topobelief.candidates.start import Start, find_start
@@ -26,6 +26,7 @@ from topobelief.graph.pose_graph import PoseGraph
 from topobelief.world import World
 
 _ROUNDING = 1e-9  # relative: what differs by less counts as equal
+_FEW = 10  # closures, of which a median says little
 KEY_POSE_TURN = math.radians(15)
 """Radians by which a path turns from new pose to new pose, as in our simulated front end."""
 
@@ -55,7 +56,8 @@ def predict_actions(
     closures
         Which loops the new poses close. Default: learned from the graph (`learn_closures`), in the `world` that is given.
     information : shape (kappa, kappa), optional
-        Of a measurement. Default: `default_information(graph)`. A predicted closure carries `closures.probability` times this.
+        Of a measurement. Default: `default_information(graph)` for odometry and `closure_information(graph)` for closures. A
+        predicted closure carries `closures.probability` times this.
     spacing
         Metres along the path from pose to pose; the last step, to the path's end, is shorter.
     turn
@@ -94,7 +96,10 @@ def predict_actions(
         raise InvalidInputError(f"expected turn above 0, or None for none, got {turn}")
     by_hand = {"closure_radius": closure_radius, "closure_angle": closure_angle, "min_index_gap": min_index_gap}
     model = _chosen_model(graph, closures, {name: value for name, value in by_hand.items() if value is not None}, world)
-    omega = default_information(graph) if information is None else information
+    if information is None:
+        of_odometry, of_closures = default_information(graph), closure_information(graph)
+    else:
+        of_odometry = of_closures = np.asarray(information, dtype=np.float64)
     begin = find_start(graph, start, world=world)
     ways: list[_Way] = []
     for index, path in enumerate(paths):
@@ -110,16 +115,21 @@ def predict_actions(
         new = graph.num_poses + np.arange(num_new)
         before = np.r_[begin.pose, new][:num_new]
         edges = np.concatenate([np.stack([before, new], axis=1), closing])
-        chances = np.r_[np.ones(num_new), np.full(len(closing), model.probability)]
         certain = model.probability == 1 or len(closing) == 0
+        expected = model.probability * of_closures
+        omega = of_odometry
+        if len(closing) and not np.array_equal(expected, of_odometry):
+            omega = np.concatenate(
+                [np.repeat(each[None], n, axis=0) for each, n in ((of_odometry, num_new), (expected, len(closing)))]
+            )
         actions.append(
             Action(
                 new_poses,
                 edges,
-                omega if certain else chances[:, None, None] * np.asarray(omega, dtype=np.float64),
+                omega,
                 label=f"path {index}",
                 length=path_length(way.driven),
-                probabilities=None if certain else chances,
+                probabilities=None if certain else np.r_[np.ones(num_new), np.full(len(closing), model.probability)],
             )
         )
     return actions
@@ -156,7 +166,32 @@ def default_information(graph: PoseGraph) -> FloatArray:
     if shared is not None:
         return shared
     consecutive = np.abs(graph.edges[:, 1] - graph.edges[:, 0]) == 1
-    chain = graph.information[consecutive] if consecutive.any() else graph.information
+    return _typical(graph.information[consecutive] if consecutive.any() else graph.information)
+
+
+def closure_information(graph: PoseGraph) -> FloatArray:
+    """Noise to expect of a new loop closure: the median over the graph's, entry by entry; that of odometry where it has few.
+
+    Closures are told from odometry as `learn_closures` does. Fewer than 10 are few: then it is `default_information(graph)`.
+    Should the median not be positive definite, the matrix with the median determinant stands in.
+
+    Returns
+    -------
+    shape (kappa, kappa)
+
+    Raises
+    ------
+    InvalidInputError
+        For a graph without edges.
+    """
+    if graph.num_edges == 0 or shared_information(graph.information) is not None:
+        return default_information(graph)
+    edges = History.of(graph).edges
+    return default_information(graph) if len(edges) < _FEW else _typical(graph.information[edges])
+
+
+def _typical(chain: FloatArray) -> FloatArray:
+    """Median of information matrices; where it is not positive definite, the matrix with the median determinant."""
     median = np.median(chain, axis=0)
     scale = 1 / np.sqrt(np.diagonal(median))
     if np.linalg.eigvalsh(median * np.outer(scale, scale))[0] > _ROUNDING:

@@ -316,9 +316,10 @@ class Planner:
                 continue
             same = np.isclose(action.information, expected, rtol=SAME_NOISE, atol=0).all(axis=(1, 2))
             for edge in np.flatnonzero(~same)[:1]:
+                weighed = "" if action.probabilities is None else ", or predict closures with certainty (ClosureModel.paper())"
                 raise InvalidActionError(
                     "the paper's bounds expect the graph's information matrix on all edges, got another one; "
-                    'use bounds="fischer"',
+                    f'use bounds="fischer"{weighed}',
                     action=index,
                     edge=int(edge),
                     label=action.label,

@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from topobelief.arrays import FloatArray
+from topobelief.candidates.learned_closures import learn_closures
 from topobelief.candidates.polyline import path_length
 from topobelief.errors import PlanningError
 from topobelief.geometry import SE2_GROUP
@@ -215,8 +216,14 @@ class Episode:
         """Candidates, the choice among them, and what all of them would have been worth."""
         begin, options, belief = time.perf_counter(), self._options, self._slam.belief
         settings = self._slam.settings
+        known, rule = self._known_world(), self._scenario.rule
+        closures = rule.closures
+        if closures is None:
+            seen_in = known if rule.line_of_sight else None
+            closures = learn_closures(belief, world=seen_in, rule=settings.expected_closures)
         rule = replace(
-            self._scenario.rule,
+            rule,
+            closures=closures,
             seed=options.seed,
             spacing=settings.key_pose_distance,
             turn=settings.key_pose_angle,
@@ -224,7 +231,7 @@ class Episode:
         )
         found = known_candidates(
             belief,
-            self._known_world(),
+            known,
             goal,
             rule,
             chassis=self._scenario.robot.radius,

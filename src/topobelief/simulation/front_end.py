@@ -21,6 +21,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from topobelief.arrays import FloatArray
+from topobelief.candidates.closures import ClosureModel
 from topobelief.errors import InvalidInputError
 from topobelief.geometry import SE2_GROUP
 from topobelief.graph.information import block_isotropic
@@ -33,6 +34,7 @@ from topobelief.simulation.scan import Scan
 __all__ = ["Factor", "FrontEnd", "FrontEndSettings", "wheel_covariance"]
 
 _DIMENSION = 3  # of the tangent
+_MATCHED_SHARE = 0.80  # of the closures that its rule predicts along a path, in ten runs each of `office` and `corridors`
 _TYPICAL_POSITION, _TYPICAL_ANGLE = 0.0015, 0.0005  # standard deviations, m and rad
 _WHEEL_GATE = float(chi2.ppf(0.9999, _DIMENSION))  # of what the laser says against the wheels
 
@@ -113,6 +115,13 @@ class FrontEndSettings:
     def expected_information(self) -> FloatArray:
         """Of a factor among walls on all sides, shape (3, 3): the median of some 1400 matches in `office` and `lab`."""
         return block_isotropic(_TYPICAL_POSITION, _TYPICAL_ANGLE)
+
+    @property
+    def expected_closures(self) -> ClosureModel:
+        """Closures that it makes: with all poses in sight within its search radius, as often as in 4900 chances so far."""
+        return ClosureModel(
+            radius=self.search_radius, min_index_gap=self.min_index_gap, max_per_pose=None, probability=_MATCHED_SHARE
+        )
 
     @property
     def gate_information(self) -> FloatArray:

@@ -51,8 +51,10 @@ class Scenario:
     approach
         Places driven to in a straight line before the first goal, without a choice.
     rule
-        Its `max_detour`, `num_vertices` and `robot_radius` count. The last is how far paths keep from walls, at least the
-        radius of the chassis, and better `SAFE_MARGIN` more. The goal says how many paths; the run and SLAM give the rest.
+        Its `max_detour`, `num_vertices`, `robot_radius`, `closures` and `line_of_sight` count. The radius is how far paths keep
+        from walls, at least that of the chassis, and better `SAFE_MARGIN` more. Closures that are None are those of the robot's
+        own front end, with a probability that is learned from its graph. The goal says how many paths; the run and SLAM give
+        the rest.
     robot, lidar
     """
 

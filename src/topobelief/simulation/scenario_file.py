@@ -20,6 +20,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TypeVar, cast, get_args
 
+from topobelief.candidates.closures import ClosureModel
 from topobelief.candidates.propose import CandidateRule
 from topobelief.errors import InvalidInputError
 from topobelief.io.floor_plan import read_world
@@ -74,7 +75,8 @@ def read_scenario(path: Path) -> Scenario:
     """
     top = read_fields(path)
     keys = top.mapping(
-        required=("map", "start", "goals"), optional=("unknown", "candidates", "max_detour", "robot_radius", "lidar", "robot")
+        required=("map", "start", "goals"),
+        optional=("unknown", "candidates", "max_detour", "robot_radius", "closures", "lidar", "robot"),
     )
     map_file = path.parent / keys["map"].text(expected="the path of a map (.yaml or .csv)")
     if not map_file.is_file():
@@ -126,6 +128,8 @@ def _rule(keys: Mapping[str, Field], *, chassis: float) -> CandidateRule:
                 f"{radius:g}; raise it, or make the chassis smaller by robot: {{radius: ...}}",
             )
         rule = dataclasses.replace(rule, robot_radius=radius)
+    if "closures" in keys and keys["closures"].choice(("learned", "paper")) == "paper":
+        rule = dataclasses.replace(rule, closures=ClosureModel.paper(), line_of_sight=False)
     return rule
 
 
