@@ -19,8 +19,8 @@ _BATCH = 64  # evaluations between two looks at the clock
 _WARM_UP = 400  # evaluations before the first step of the bound
 _PATIENCE = 500  # evaluations without improvement after which local search rests
 _MOST_IDLE = 20  # restarts in a row that come upon known walks only, after which it rests too
-_STEPS_PER_LOOK = 30  # of the bound, in which it closes at least
-_LEAST_PROGRESS = 0.02  # this share of the gap, or rests; with a deadline it goes on
+_STEPS_PER_LOOK = 20  # of the bound, in which it closes at least
+_LEAST_PROGRESS = 0.05  # this share of the gap, or rests; with a deadline it goes on
 
 
 class SearchProgress(NamedTuple):

@@ -20,7 +20,7 @@ from scipy.spatial import KDTree
 from topobelief.arrays import FloatArray
 from topobelief.candidates.closures import ClosureModel
 from topobelief.candidates.learned_closures import learn_closures
-from topobelief.candidates.predicted_factors import default_information, predict_actions
+from topobelief.candidates.predicted_factors import closure_information, default_information, predict_actions
 from topobelief.candidates.roadmap import Roadmap
 from topobelief.candidates.start import Start, find_start
 from topobelief.errors import InvalidInputError, PlanningError
@@ -128,12 +128,14 @@ def search_roadmap(
     walks = _walks_within(roadmap, goal, max_detour, max_length, return_to_start)
     planner = Planner(graph, objective=objective, engine="incremental" if find_spec("numba") else "scratch")
     model = learn_closures(graph, world=world) if closures is None else closures
-    omega = default_information(graph) if information is None else np.asarray(information, dtype=np.float64)
+    of_odometry, of_closures = (
+        (default_information(graph), closure_information(graph)) if information is None else (np.asarray(information),) * 2
+    )
     begin = find_start(graph, start, world=world)
 
     def predict(paths: list[FloatArray]) -> list[Action]:
         return predict_actions(
-            graph, paths, closures=model, information=omega, spacing=spacing, turn=turn, world=world, start=begin
+            graph, paths, closures=model, information=information, spacing=spacing, turn=turn, world=world, start=begin
         )
 
     evaluations = Evaluations(planner, predict, walks.roadmap.vertices, cost_per_metre)
@@ -151,7 +153,8 @@ def search_roadmap(
             objective=objective,
             closures=model,
             spacing=spacing,
-            information=omega,
+            information=of_odometry,
+            closure_information=of_closures,
             world=world,
             cost_per_metre=cost_per_metre,
             return_to_start=return_to_start,
@@ -172,7 +175,7 @@ def search_roadmap(
     objectives = values - cost_per_metre * lengths
     front = on_front(lengths, objectives)
     walks_on_front: list[Walk] = [every[index] for index in front.tolist()]
-    stay = Action(np.zeros((0, graph.poses.shape[1])), np.zeros((0, 2), np.int64), omega)
+    stay = Action(np.zeros((0, graph.poses.shape[1])), np.zeros((0, 2), np.int64), of_odometry)
     return SearchResult(
         best=way(best),
         alternatives=tuple(way(walk) for walk in others),
