@@ -20,7 +20,8 @@ def front_rows(result: SearchResult, count: int = 5) -> list[tuple[str, str, str
     count
         How many at most, spread over the lengths, at least 2.
     """
-    ways = [result.on_front[place] for place in spread_on_front(result.front[:, 0], count).tolist()]
+    places: list[int] = spread_on_front(result.front[:, 0], count).tolist()
+    ways = [result.on_front[place] for place in places]
     most = max((result.value_now - _objective(way) for way in ways), default=0.0)
     return [
         (
