@@ -37,9 +37,9 @@ from .planning.drawn_closures import drawn_values as drawn_values
 from .planning.planner import Planner as Planner
 from .position_errors import ExpectedErrors as ExpectedErrors
 from .position_errors import expected_errors as expected_errors
+from .report.search_figure import draw_front as draw_front
 from .search.result import SearchResult as SearchResult
 from .search.roadmap_search import search_roadmap as search_roadmap
-from .report.search_figure import draw_front as draw_front
 from .signatures.resistance import resistance_signature as resistance_signature
 from .signatures.spanning_trees import log_num_spanning_trees as log_num_spanning_trees
 from .signatures.spanning_trees import spanning_tree_signature as spanning_tree_signature

@@ -29,11 +29,12 @@ from topobelief.search.walks import Walk, Walks
 
 Vias = tuple[int, ...]
 
-_NUM_LEADERS = 6
+_NUM_LEADERS = 10
 _NUM_SHORTER = 6  # leaders at shorter lengths
-_DIFFERENT = 0.05  # share of the length limit by which leaders differ (Fréchet)
+_DIFFERENT = 0.1  # share of the length limit by which leaders differ (Fréchet)
 _LEAST_EXTRA = 0.02  # share of the length limit that an insertion counts as at least
 _NUM_NEAR = 8  # vertices near a via-vertex that may replace it
+_BATCHES_PER_CLIMB = 2  # of the neighbours of a walk, while climbing from a new start
 _MOST_COMPARED = 250  # walks among which leaders are looked for
 
 
@@ -105,8 +106,8 @@ class LocalSearch:
         improved = True
         while improved:
             improved = False
-            for batch in self._batches(walk, size):
-                walks = [self._walks.walk(change.vias) for change in batch]
+            for batch in itertools.islice(self._batches(walk, size), _BATCHES_PER_CLIMB):
+                walks = [change.walk or self._walks.walk(change.vias) for change in batch]
                 self._evaluations.evaluate(walks)
                 best = min(walks, key=self._evaluations.value, default=walk)
                 if self._evaluations.value(best) < self._evaluations.value(walk):
@@ -149,6 +150,7 @@ class LocalSearch:
         vias = self._walks.vias(walk)
         changes = itertools.chain(
             self._omissions(vias),
+            self._shifts(vias),
             self._insertions(vias),
             self._replacements(vias),
             self._exchanges(vias),
@@ -183,13 +185,16 @@ class LocalSearch:
         return [change for _, change in found]
 
     def _replacements(self, vias: Vias) -> Iterator[_Change]:
-        """Another via-vertex in the place of one: first those near it, then all candidates."""
-        for place, via in enumerate(vias):
-            for other in self._neighbours(via):
-                yield from self._within((*vias[:place], other, *vias[place + 1 :]))
+        """Another candidate in the place of a via-vertex."""
         for place in range(len(vias)):
             for change in self._insertions((*vias[:place], *vias[place + 1 :]), [place]):
                 yield _Change(change.vias)
+
+    def _shifts(self, vias: Vias) -> Iterator[_Change]:
+        """A vertex nearby in the place of a via-vertex."""
+        for place, via in enumerate(vias):
+            for other in self._neighbours(via):
+                yield from self._within((*vias[:place], other, *vias[place + 1 :]))
 
     def _neighbours(self, via: int) -> list[int]:
         _, near = self._near.query(self._walks.roadmap.vertices[via], k=min(_NUM_NEAR + 1, len(self._reachable)))
