@@ -62,6 +62,26 @@ def test_bound_never_falls():
     assert bound.lower_bound == before
 
 
+def test_an_interrupted_step_forgets_nothing(monkeypatch):
+    """After Ctrl-C in the middle of a step the walks that were worked on are still bounded."""
+    case = random_case(17)
+    bound = flow_bound(case.graph, case.roadmap, objective="map", **case.arguments())
+    for _ in range(3):
+        bound.step()
+    before = bound.lower_bound
+
+    def interrupted(*_arguments):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr("topobelief.search.flows.longest_path", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            bound.step()
+    bound.prune(float(case.values("map", case.walks()).min()))
+    assert bound.lower_bound == before
+    assert not bound.finished
+
+
 def test_driven_in_three_dimensions():
     """A planar graph in SE(3): the bound covers its walks too."""
     case = random_case(85)
@@ -107,3 +127,5 @@ def test_says_what_is_wrong():
         flow_bound(case.graph, case.roadmap, objective="best", **case.arguments())
     with pytest.raises(tb.TopobeliefError, match="expected a cost of at least 0"):
         flow_bound(case.graph, case.roadmap, objective="map", **case.arguments() | {"cost_per_metre": -1.0})
+    with pytest.raises(tb.TopobeliefError, match="expected edge_costs of at least 0 for each of"):
+        flow_bound(case.graph, case.roadmap, objective="map", edge_costs=[1.0], **case.arguments())

@@ -20,8 +20,8 @@ from topobelief.search.ways import Ways, find_sightings
 from topobelief.world import World
 
 _OBJECTIVES = ("error", "map", "joint", "per_pose")
-_ARCS = 300_000  # aimed at: as many layers as make about so many arcs
-_FINEST, _COARSEST = 40, 4  # pieces per spacing
+_ARCS = 500_000  # aimed at: as many layers as make about so many arcs
+_FINEST, _COARSEST = 40, 3  # pieces per spacing
 _IDLE = 1e-4  # information of the odometry of idle poses, in that of others, where their number does not count
 _SAME_PLACE = 1e-9  # metres
 _ROUNDING = 1e-9  # relative; bounds are lowered by it
@@ -97,6 +97,8 @@ def flow_bound(
     if not (math.isfinite(cost_per_metre) and cost_per_metre >= 0):
         raise InvalidInputError(f"expected a cost of at least 0 a metre, got {cost_per_metre}")
     extra = np.zeros(len(roadmap.edges)) if edge_costs is None else np.asarray(edge_costs, dtype=np.float64)
+    if extra.shape != roadmap.lengths.shape or not (np.isfinite(extra) & (extra >= 0)).all():
+        raise InvalidInputError(f"expected edge_costs of at least 0 for each of {len(roadmap.edges)} edges, got {extra.shape}")
     end = start if return_to_start and goal is None else goal
     to_go = np.zeros(len(roadmap.vertices)) if end is None else roadmap.distances_to(end)
     if not to_go[start] <= max_length * (1 + _ROUNDING):

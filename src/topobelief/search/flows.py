@@ -5,7 +5,8 @@ the flow. Frank-Wolfe: at a flow x the longest path for the gradient is a walk, 
 function says there. The walks found are an active set whose weights are optimised anew at each step.
 
 Flows are in many corridors at once. So the walks are split: those whose t-th new pose stands on one side of a line, and
-those for which it is on the other side. Each part has flows of its own; the least of their bounds is the bound of all."""
+those for which it is on the other side. Each part has flows of its own; the least of their bounds is the bound of all.
+"""
 
 from __future__ import annotations
 
@@ -32,10 +33,11 @@ _ROUNDING = 1e-9  # relative; bounds are lowered by it
 _LARGEST_SET = 40  # walks whose weights are optimised
 _TOLL_TRIALS = 2  # longest paths a step, to find the price of a metre
 _STEPS_BEFORE_SPLIT = 3
-_SLOW = 0.15  # of what is missing to the best value: a part whose bound rises by less a step is split
-_CONVERGED = 0.25  # of what is missing: a part whose own optimum is known as well as that is split
-_SLOW_STEPS = 4  # after so many, a part that cannot be split is left as it is
+_SLOW = 0.15  # of what is missing to the value of the flow: a step that raises the bound by less is slow
+_CONVERGED = 0.25  # of what is missing to the best value: a part whose own optimum is known that well is split
+_SLOW_STEPS = 3  # after so many in a row a part is split too; after twice as many, what cannot be split is left as it is
 _LEAST_WEIGHT = 1e-3  # of walks that count where parts are split
+_SMALL_WEIGHT = 0.05  # of all walks of the active set, where those that count agree
 
 
 @dataclass(eq=False, slots=True)
@@ -52,6 +54,7 @@ class _Part:
     steps: int = 0
     fresh: int = 0  # steps since it was made
     slow: int = 0  # latest steps in a row that hardly raised the bound
+    is_ready: bool = False  # to be split
 
 
 class FlowBound:
@@ -109,18 +112,19 @@ class FlowBound:
     def step(self) -> list[IntArray]:
         if not self._open:
             return []
-        _, _, part = heapq.heappop(self._open)
+        _, _, part = self._open[0]  # it stays there until its work is done, which may be interrupted
         parts = [part]
-        if part.fresh >= _STEPS_BEFORE_SPLIT and part.slow:
+        if part.fresh >= _STEPS_BEFORE_SPLIT and part.is_ready:
             halves = self._split(part)
             if halves is not None:
                 parts = halves
-            elif part.slow >= _SLOW_STEPS:
-                self._closed = min(self._closed, part.bound)
-                parts = []
+            elif part.slow >= 2 * _SLOW_STEPS:
+                self._closed, parts = min(self._closed, part.bound), []
         found: list[IntArray] = []
         for each in parts:
             found.extend(self._improved(each))
+        heapq.heappop(self._open)
+        for each in parts:
             if len(each.arcs) and each.bound < self._best:
                 heapq.heappush(self._open, (each.bound, next(self._counter), each))
         self.num_steps += 1
@@ -180,11 +184,10 @@ class FlowBound:
         value = criterion.to_objective(criterion.of_gain(gain) + criterion.linear(plan))
         bound = criterion.to_objective(bound)
         bound -= _ROUNDING * (abs(bound) + abs(criterion.of_gain(0.0)))
-        missing = self._best - part.bound
-        known = math.isfinite(missing)
-        slow = bound - part.bound < _SLOW * (missing if known else value - part.bound)
-        slow = slow or (known and value - bound < _CONVERGED * (self._best - bound))
-        part.slow = part.slow + 1 if slow else 0
+        missing = self._best - max(part.bound, bound)
+        converged = value - max(part.bound, bound) < _CONVERGED * missing if math.isfinite(missing) else False
+        part.slow = part.slow + 1 if bound - part.bound < _SLOW * abs(value - part.bound) else 0
+        part.is_ready = converged or part.slow >= _SLOW_STEPS
         part.bound = max(part.bound, bound)
         if math.isfinite(threshold):
             self._thin(part, weights, lengths, threshold + offset - part.toll * self._max_length)
@@ -271,8 +274,11 @@ class FlowBound:
         That is the side of a line on which one of the new poses stands, or the number of new poses.
         """
         layers = self._rewards.layers
-        line, count = self._dividing_line(part), self._dividing_number(part)
-        if line is None and count is None:
+        for weights in (part.weights, np.maximum(part.weights, _SMALL_WEIGHT)):
+            line, count = self._dividing_line(part, weights), self._dividing_number(part, weights)
+            if line is not None or count is not None:
+                break
+        else:
             return None
         if count is None or (line is not None and line[0] >= count[0]):
             assert line is not None
@@ -299,7 +305,7 @@ class FlowBound:
         records = used_records(layers.arcs, arcs, len(layers.records.number))
         return _Part(arcs, records, courses, weights, part.bound, part.toll)
 
-    def _dividing_line(self, part: _Part) -> tuple[float, int, FloatArray, float] | None:
+    def _dividing_line(self, part: _Part, shares: FloatArray) -> tuple[float, int, FloatArray, float] | None:
         """Score, number of a new pose, unit vector, and where along it to cut."""
         records = self._rewards.layers.records
         middle = (self._begin + self._end) / 2
@@ -308,7 +314,7 @@ class FlowBound:
         for t in range(1, self._rewards.num_new + 1):
             places: list[FloatArray] = []
             weights: list[float] = []
-            for course, number, weight in zip(part.courses, numbers, part.weights.tolist(), strict=True):
+            for course, number, weight in zip(part.courses, numbers, shares.tolist(), strict=True):
                 at = np.flatnonzero(number == t)
                 if at.size and weight > _LEAST_WEIGHT:
                     places.append(middle[course.records[at[0]]])
@@ -320,12 +326,12 @@ class FlowBound:
                 best = cut[0], t, cut[1], cut[2]
         return best
 
-    def _dividing_number(self, part: _Part) -> tuple[float, int] | None:
+    def _dividing_number(self, part: _Part, shares: FloatArray) -> tuple[float, int] | None:
         """Score, and up to how many new poses the walks of one side have."""
-        used = part.weights > _LEAST_WEIGHT
+        used = shares > _LEAST_WEIGHT
         number = np.array([course.plan.num_poses for course, keep in zip(part.courses, used, strict=True) if keep])
         if len(number) < 2 or np.ptp(number) == 0:
             return None
         spacing = self._rewards.delta * self._rewards.layers.pieces_per_pose
-        cut = best_place(spacing * number, part.weights[used], 0.5 * spacing)
+        cut = best_place(spacing * number, shares[used], 0.5 * spacing)
         return None if cut is None else (cut[0], math.floor(cut[1] / spacing))
