@@ -18,7 +18,7 @@ Reason = Literal["proof", "gap", "deadline", "interrupt", "rest"]
 _BATCH = 64  # evaluations between two looks at the clock
 _WARM_UP = 400  # evaluations before the first step of the bound
 _PATIENCE = 500  # evaluations without improvement after which local search rests
-_MOST_IDLE = 20  # restarts in a row that come upon known walks only, after which it rests too
+_MOST_RESTARTS = 20  # without improvement, likewise
 _STEPS_PER_LOOK = 20  # of the bound, in which it closes at least
 _LEAST_PROGRESS = 0.05  # this share of the gap, or rests; with a deadline it goes on
 
@@ -65,6 +65,7 @@ class AnytimeSearch:
         self._bound: WalkBound | None = None
         self._best = math.inf
         self._at_best = 0  # evaluations made when the best value was found
+        self._restarts = 0  # of local search, since then
         self._bounds: list[float] = []  # after each step
 
     @property
@@ -108,7 +109,13 @@ class AnytimeSearch:
         """One batch of local search; whether there was anything left worth trying."""
         if len(self._evaluations) - self._at_best > _PATIENCE:
             return False
-        return self._local.step(_BATCH) > 0 or any(self._local.restart(_BATCH) for _ in range(_MOST_IDLE))
+        if self._local.step(_BATCH):
+            return True
+        while self._restarts < _MOST_RESTARTS:
+            self._restarts += 1
+            if self._local.restart(_BATCH):
+                return True
+        return False
 
     def _bound_on(self) -> bool:
         """One step of the bound; whether it may still make progress."""
@@ -136,7 +143,7 @@ class AnytimeSearch:
         """Take in the best value, and tell of progress."""
         best = self._evaluations.value(self._evaluations.best())
         if best < self._best - SAME_VALUE * abs(best):
-            self._best, self._at_best = best, len(self._evaluations)
+            self._best, self._at_best, self._restarts = best, len(self._evaluations), 0
         if self._on_progress is not None:
             seconds = time.monotonic() - self._began
             self._on_progress(SearchProgress(seconds, len(self._evaluations), self._best, self.lower_bound))

@@ -68,6 +68,7 @@ class LocalSearch:
         self._yield: dict[int, float] = {}  # most that inserting a via-vertex gained, per metre
         self._left: dict[Walk, Iterator[list[_Change]]] = {}
         self._exhausted: set[Walk] = set()
+        self._leaders_of: tuple[int, list[Walk]] = (0, [])  # when so many walks were evaluated
 
     def seed(self, walks: Iterable[Walk]) -> None:
         """Evaluate walks that come from elsewhere; they take part from now on."""
@@ -137,13 +138,16 @@ class LocalSearch:
 
     def _leaders(self) -> list[Walk]:
         """The best walks that differ from each other, then some of the best at shorter lengths."""
+        if self._leaders_of[0] == len(self._evaluations):
+            return self._leaders_of[1]
         walks, lengths, values = self._evaluations.arrays()
         best_first = np.argsort(values, kind="stable")[:_MOST_COMPARED].tolist()
         leaders = self._evaluations.different(best_first, _NUM_LEADERS, _DIFFERENT * self._walks.max_length)
         shorter = on_front(lengths, values)
         spread = shorter[spread_on_front(lengths[shorter], _NUM_SHORTER)]
         front: list[Walk] = [walks[index] for index in spread.tolist()]
-        return list(dict.fromkeys([*leaders, *front]))
+        self._leaders_of = len(self._evaluations), list(dict.fromkeys([*leaders, *front]))
+        return self._leaders_of[1]
 
     def _batches(self, walk: Walk, size: int) -> Iterator[list[_Change]]:
         """Neighbours of a walk, most promising first."""
