@@ -189,7 +189,14 @@ _NAMES = {
 
 
 def said(value: float, objective: str) -> str:
-    """A value with its unit as a person reads it: centimetres for errors, nats for entropies."""
+    """A value with its unit as a person reads it: a length for errors, nats for entropies.
+
+    Examples
+    --------
+    >>> said(0.162, "error"), said(0.0029, "error"), said(12.34, "map")
+    ('16.2 cm', '2.90 mm', '12.3 nats')
+    """
     if objective == "error":
-        return f"{100 * value:#.3g} cm" if abs(value) < 1 else f"{value:.2f} m"
+        small = f"{1000 * value:#.3g} mm" if 0 < abs(value) < 0.01 else f"{100 * value:#.3g} cm"
+        return small if abs(value) < 1 else f"{value:.2f} m"
     return f"{value:.1f} {_UNITS.get(objective, 'nats')}" if objective != "per_pose" else f"{value:.3f} nats per pose"
