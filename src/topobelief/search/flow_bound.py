@@ -20,7 +20,7 @@ from topobelief.search.ways import Ways, find_sightings
 from topobelief.world import World
 
 _OBJECTIVES = ("error", "map", "joint", "per_pose")
-_ARCS = 500_000  # aimed at: as many layers as make about so many arcs
+_ARCS = 400_000  # aimed at: as many layers as make about so many arcs
 _FINEST, _COARSEST = 40, 3  # pieces per spacing
 _IDLE = 1e-4  # information of the odometry of idle poses, in that of others, where their number does not count
 _SAME_PLACE = 1e-9  # metres
