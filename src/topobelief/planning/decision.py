@@ -132,7 +132,7 @@ class Decision(ReadOnlyArrays):
 
     @property
     def objective_in_words(self) -> str:
-        """"map entropy", "expected error of the map" and the like."""
+        """ "map entropy", "expected error of the map" and the like."""
         return "expected error of the map" if self.unit == "m" else f"{self.objective} entropy"
 
     def _claim(self) -> str:
