@@ -17,7 +17,7 @@ Reason = Literal["proof", "gap", "deadline", "interrupt", "rest"]
 
 _BATCH = 64  # evaluations between two looks at the clock
 _WARM_UP = 400  # evaluations before the first step of the bound
-_PATIENCE = 500  # evaluations without improvement after which local search rests
+_PATIENCE = 1000  # evaluations without improvement after which local search rests
 _MOST_RESTARTS = 20  # without improvement, likewise
 _STEPS_PER_LOOK = 20  # of the bound, in which it closes at least
 _LEAST_PROGRESS = 0.05  # this share of the gap, or rests; with a deadline it goes on
