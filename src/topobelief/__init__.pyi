@@ -45,6 +45,9 @@ from .report.drawing import draw_bounds as draw_bounds
 from .report.drawing import draw_graph as draw_graph
 from .report.drawing import draw_paths as draw_paths
 from .report.progress import progress as progress
+from .report.search_figure import draw_front as draw_front
+from .search.result import SearchResult as SearchResult
+from .search.roadmap_search import search_roadmap as search_roadmap
 from .signatures.resistance import resistance_signature as resistance_signature
 from .signatures.spanning_trees import log_num_spanning_trees as log_num_spanning_trees
 from .signatures.spanning_trees import spanning_tree_signature as spanning_tree_signature

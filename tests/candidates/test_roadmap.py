@@ -286,3 +286,14 @@ def radius_named(world: World, start: tuple, goal: tuple, radius: float) -> floa
         build_roadmap(world, start, goal, robot_radius=radius)
     (named,) = re.findall(r"a radius of (\S+) m would get through", str(caught.value))
     return float(named)
+
+
+def test_without_a_goal_the_roadmap_reaches_all_over():
+    world = World.from_boxes([(4, 0, 4.2, 7)], bounds=(0, 0, 20, 10))
+    roadmap = build_roadmap(world, (1, 1), num_vertices=100, robot_radius=0.2)
+    lengths = roadmap.distances_to(0)
+    assert np.linalg.norm(roadmap.vertices[1] - (1, 1)) > 10
+    assert np.isfinite(lengths).all()
+    assert roadmap.vertices[:, 0].max() > 18
+    with pytest.raises(PlanningError, match="expected a start"):
+        build_roadmap(world, (4.1, 3), robot_radius=0.2)

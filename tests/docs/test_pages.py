@@ -52,7 +52,7 @@ def make_objectives() -> ModuleType:
     return module
 
 
-@pytest.mark.parametrize("name", ["mathematics.md", "conventions.md"])
+@pytest.mark.parametrize("name", ["mathematics.md", "conventions.md", "search.md"])
 def test_the_examples_of_a_page_give_what_it_prints(name: str) -> None:
     results = doctest.testfile(str(DOCS / name), module_relative=False, encoding="utf-8")
     assert results.attempted > 0

@@ -40,6 +40,7 @@ _IMPROVEMENT = 0.005  # of the shortest path's length, below which more neighbou
 _CORNERS_PER_VERTEX = 8  # at most, per vertex asked for
 _ROOM_FOR_CORNERS = 1.25  # robot radii; in a passage with less room there is no place for two corners
 _MAX_DRAWS = 4  # times the random places asked for
+_FAR_DRAWS = 64  # places among which one far from the start is taken
 _RADIUS_ACCURACY = 0.005  # of the robot's radius, to which a radius that gets through is found
 _SAME_PLACE = 1e-9  # metres
 
@@ -119,6 +120,24 @@ class Roadmap:
         """Length of the shortest way from each vertex, shape (V,); inf where there is none."""
         return _dijkstra(self._adjacency[0], indices=target)
 
+    def shortest_ways(self, sources: ArrayLike) -> tuple[FloatArray, IntArray]:
+        """Shortest ways from some vertices to all.
+
+        Parameters
+        ----------
+        sources : shape (S,)
+            Vertices.
+
+        Returns
+        -------
+        lengths : shape (S, V)
+            Metres; inf where there is no way.
+        previous : shape (S, V)
+            The vertex before each on its way; negative at the source and where there is no way.
+        """
+        lengths, previous = _dijkstra(self._adjacency[0], indices=np.asarray(sources), return_predecessors=True)
+        return lengths, previous.astype(np.int64)
+
     def between(self, start: ArrayLike, goal: ArrayLike) -> Roadmap:
         """The same roadmap for another start and goal, which join it as its first two vertices.
 
@@ -145,7 +164,7 @@ class Roadmap:
 def build_roadmap(
     world: World,
     start: ArrayLike,
-    goal: ArrayLike,
+    goal: ArrayLike | None = None,
     num_vertices: int = 1000,
     robot_radius: float = 0.35,
     seed: int = 0,
@@ -156,7 +175,8 @@ def build_roadmap(
     ----------
     world
     start, goal : shape (2,) or (3,)
-        Where the robot's centre is and shall be, metres; a heading is ignored.
+        Where the robot's centre is and shall be, metres; a heading is ignored. Without a goal the roadmap is one for trips to
+        anywhere: its second vertex is a place that is far from the start.
     num_vertices
         At least. The places in passages and at corners are as many as the world has, corners up to 8 times this number.
         What they leave of it, half of it at the least, are random places: variety within a class of paths. The roadmap
@@ -182,6 +202,7 @@ def build_roadmap(
     """
     if num_vertices < 2:
         raise InvalidInputError(f"expected at least 2 vertices, start and goal, got {num_vertices}")
+    goal = _far_place(world, start, robot_radius, seed) if goal is None else goal
     ends = checked_ends(world, start, goal, robot_radius)
     region = world.component(ends[0], robot_radius)
     if region.distance(shapes.point(ends[1])) > _SAME_PLACE:
@@ -277,6 +298,16 @@ def _checked_place(place: ArrayLike, name: str) -> FloatArray:
     if array.shape not in ((2,), (3,)) or not np.isfinite(array).all():
         raise InvalidInputError(f"expected a finite {name} (x, y) or (x, y, theta), got {array.tolist()}")
     return array[:2]
+
+
+def _far_place(world: World, start: ArrayLike, robot_radius: float, seed: int) -> FloatArray:
+    """Of places drawn where the robot can go, the one furthest from the start; the start itself where none is free."""
+    place = _checked_place(start, "start")
+    region = world.component(place, robot_radius)
+    triangles = np.concatenate([shapes.triangles(polygon) for polygon in shapes.polygons(region)])
+    drawn = _uniform(triangles, _FAR_DRAWS, rng=np.random.default_rng(seed))
+    drawn = drawn[world.segments_free(drawn, drawn, robot_radius)]
+    return drawn[np.argmax(np.linalg.norm(drawn - place, axis=1))] if len(drawn) else place
 
 
 def _random_places(

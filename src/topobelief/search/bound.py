@@ -93,6 +93,7 @@ class WalkBoundConstructor(Protocol):
         closures: ClosureRule,
         spacing: float,
         information: FloatArray,
+        closure_information: FloatArray | None = None,
         world: World | None,
         cost_per_metre: float = 0.0,
         return_to_start: bool = False,
@@ -115,7 +116,9 @@ class WalkBoundConstructor(Protocol):
         spacing
             Metres from new pose to new pose.
         information : shape (kappa, kappa)
-            Of every predicted factor.
+            Of odometry.
+        closure_information : shape (kappa, kappa), optional
+            Of a loop closure that is made for certain. Default: that of odometry.
         world
             What poses must see each other in; None: they always do.
         cost_per_metre

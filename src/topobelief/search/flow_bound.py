@@ -38,6 +38,7 @@ def flow_bound(
     closures: ClosureRule,
     spacing: float,
     information: ArrayLike,
+    closure_information: ArrayLike | None = None,
     world: World | None,
     cost_per_metre: float = 0.0,
     return_to_start: bool = False,
@@ -65,7 +66,9 @@ def flow_bound(
     spacing
         Metres from new pose to new pose.
     information : shape (kappa, kappa)
-        Of every predicted factor.
+        Of odometry.
+    closure_information : shape (kappa, kappa), optional
+        Of a loop closure that is made for certain. Default: that of odometry.
     world
         What poses must see each other in; None: they always do.
     cost_per_metre
@@ -87,6 +90,7 @@ def flow_bound(
     """
     require_choice("objective", objective, _OBJECTIVES)
     omega = np.asarray(information, dtype=np.float64)
+    of_closures = omega if closure_information is None else np.asarray(closure_information, dtype=np.float64)
     pose = graph.num_poses - 1 if pose is None else pose
     if not (math.isfinite(max_length) and max_length >= 0):
         raise InvalidInputError(f"expected a length of at least 0 m, got {max_length}")
@@ -145,7 +149,7 @@ def flow_bound(
         graph,
         pose,
         seen,
-        omega,
+        of_closures,
         probability=closures.probability,
         min_index_gap=closures.min_index_gap,
         with_errors=objective == "error",

@@ -1,0 +1,83 @@
+"""The result of a search over a roadmap as rows and sentences: what each further metre buys, and the other ways."""
+
+from __future__ import annotations
+
+import math
+
+from rich import box
+from rich.table import Table
+
+from topobelief.search.front import spread_on_front
+from topobelief.search.result import SearchResult, Way, said
+
+
+def front_rows(result: SearchResult, count: int = 5) -> list[tuple[str, str, str, str]]:
+    """Some ways of the front: length, loop closures, objective without cost, and what of the gain of the longest it has.
+
+    Parameters
+    ----------
+    result
+    count
+        How many at most, spread over the lengths, at least 2.
+    """
+    places: list[int] = spread_on_front(result.front[:, 0], count).tolist()
+    ways = [result.on_front[place] for place in places]
+    most = max((result.value_now - _objective(way) for way in ways), default=0.0)
+    return [
+        (
+            f"{way.length:.1f} m",
+            str(way.action.num_closures),
+            said(_objective(way), result.objective),
+            f"{100 * (result.value_now - _objective(way)) / most:.0f} %" if most > 0 else "–",
+        )
+        for way in ways
+    ]
+
+
+def front_table(result: SearchResult, count: int = 5) -> Table:
+    """Some ways of the front, shortest first."""
+    table = _table("what each further metre buys", ("way", "closures", "after it", "of the gain"))
+    for row in front_rows(result, count):
+        table.add_row(*row)
+    return table
+
+
+def ways_table(result: SearchResult) -> Table:
+    """The best way and its alternatives."""
+    names = ["way", "closures", "after it"] + (["with its cost"] if result.cost_per_metre else [])
+    table = _table("the best ways found", ("#", *names))
+    for rank, way in enumerate((result.best, *result.alternatives), start=1):
+        cells = [f"{way.length:.1f} m", str(way.action.num_closures), said(_objective(way), result.objective)]
+        cells += [said(way.value, result.objective)] if result.cost_per_metre else []
+        table.add_row(str(rank), *cells, style="bold green" if rank == 1 else "")
+    return table
+
+
+def certificate(result: SearchResult) -> list[str]:
+    """What is proven, of which walks, and at which expense, in sentences."""
+    work = f"{result.num_evaluations} ways evaluated in {result.seconds:.1f} s; stopped: {_REASONS[result.stopped_by]}."
+    if math.isinf(result.lower_bound):
+        return [work, "Nothing is proven of other ways."]
+    bound = said(result.lower_bound, result.objective)
+    return [work, f"No walk has less than {bound}: {result.covers}."]
+
+
+_REASONS = {
+    "proof": "the best way is proven",
+    "gap": "the gap asked for is reached",
+    "deadline": "the time is up",
+    "interrupt": "interrupted",
+    "rest": "neither value nor bound improved any more",
+}
+
+
+def _objective(way: Way) -> float:
+    """Without the cost of its length."""
+    return way.value - way.action.cost
+
+
+def _table(title: str, columns: tuple[str, ...]) -> Table:
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1), pad_edge=False, title=title, title_justify="left", title_style="bold")
+    for name in columns:
+        table.add_column(name, justify="right", no_wrap=True)
+    return table

@@ -1,0 +1,149 @@
+"""Local search and a bound in turns, each the other's food, until the best value is proven, the time is up, or both rest."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from typing import Literal, NamedTuple
+
+from topobelief.search.bound import WalkBound
+from topobelief.search.evaluations import SAME_VALUE, Evaluations
+from topobelief.search.local_search import LocalSearch
+from topobelief.search.walks import Walk
+
+Reason = Literal["proof", "gap", "deadline", "interrupt", "rest"]
+"""Why a search stopped."""
+
+_BATCH = 64  # evaluations between two looks at the clock
+_WARM_UP = 400  # evaluations before the first step of the bound
+_PATIENCE = 1000  # evaluations without improvement after which local search rests
+_MOST_RESTARTS = 20  # without improvement, likewise
+_STEPS_PER_LOOK = 20  # of the bound, in which it closes at least
+_LEAST_PROGRESS = 0.05  # this share of the gap, or rests; with a deadline it goes on
+
+
+class SearchProgress(NamedTuple):
+    """What is known at some time of a search."""
+
+    seconds: float
+    num_evaluations: int
+    value: float  # of the best way so far, cost included
+    lower_bound: float  # -inf while nothing is known
+
+
+class AnytimeSearch:
+    """A search that can be stopped at any time.
+
+    Parameters
+    ----------
+    evaluations, local
+        Local search evaluates its walks there.
+    make_bound
+        Called once, when local search has found first values; None: search without a bound.
+    began, deadline
+        Seconds: on the monotonic clock, and from then on; None for no deadline.
+    gap
+        To stop at, in the unit of the objective.
+    on_progress
+    """
+
+    def __init__(
+        self,
+        evaluations: Evaluations,
+        local: LocalSearch,
+        make_bound: Callable[[], WalkBound] | None,
+        *,
+        began: float,
+        deadline: float | None,
+        gap: float,
+        on_progress: Callable[[SearchProgress], None] | None,
+    ) -> None:
+        self._evaluations, self._local, self._make_bound = evaluations, local, make_bound
+        self._began, self._gap, self._on_progress = began, gap, on_progress
+        self._end = math.inf if deadline is None else began + deadline
+        self._bound: WalkBound | None = None
+        self._best = math.inf
+        self._at_best = 0  # evaluations made when the best value was found
+        self._restarts = 0  # of local search, since then
+        self._bounds: list[float] = []  # after each step
+
+    @property
+    def lower_bound(self) -> float:
+        """No walk of the class has a smaller value; never above the best one found."""
+        return -math.inf if self._bound is None else min(self._bound.lower_bound, self._best)
+
+    @property
+    def covers(self) -> str:
+        """Which walks the lower bound covers."""
+        return "" if self._bound is None else self._bound.covers
+
+    @property
+    def proven(self) -> bool:
+        """Whether no walk can be better, to rounding."""
+        return self._best - self.lower_bound <= SAME_VALUE * abs(self._best)
+
+    def run(self, seeds: Sequence[Walk]) -> Reason:
+        """Search, from some walks; returns why it stopped."""
+        try:
+            self._local.seed(seeds)
+            while True:
+                self._note()
+                if self.proven:
+                    return "proof"
+                if self._best - self.lower_bound <= self._gap:
+                    return "gap"
+                if time.monotonic() >= self._end:
+                    return "deadline"
+                moved = self._search_on()
+                if len(self._evaluations) >= _WARM_UP or not moved:
+                    moved |= self._bound_on()
+                if not moved:
+                    return "rest"
+        except KeyboardInterrupt:
+            if len(self._evaluations) == 0:
+                raise
+            return "interrupt"
+
+    def _search_on(self) -> bool:
+        """One batch of local search; whether there was anything left worth trying."""
+        if len(self._evaluations) - self._at_best > _PATIENCE:
+            return False
+        if self._local.step(_BATCH):
+            return True
+        while self._restarts < _MOST_RESTARTS:
+            self._restarts += 1
+            if self._local.restart(_BATCH):
+                return True
+        return False
+
+    def _bound_on(self) -> bool:
+        """One step of the bound; whether it may still make progress."""
+        if self._make_bound is None:
+            return False
+        if self._bound is None:
+            self._bound = self._make_bound()
+        if self._bound.finished or self._bound_rests:
+            return False
+        self._bound.prune(self._best)
+        walks = self._bound.step()
+        self._bounds.append(self._bound.lower_bound)
+        self._local.seed([tuple(walk.tolist()) for walk in walks])
+        return True
+
+    @property
+    def _bound_rests(self) -> bool:
+        """Whether its last steps closed hardly any of the gap."""
+        if len(self._bounds) <= _STEPS_PER_LOOK or self._end < math.inf:
+            return False
+        before = self._bounds[-_STEPS_PER_LOOK - 1]
+        return self._bounds[-1] - before < _LEAST_PROGRESS * (self._best - before)
+
+    def _note(self) -> None:
+        """Take in the best value, and tell of progress."""
+        best = self._evaluations.value(self._evaluations.best())
+        if best < self._best - SAME_VALUE * abs(best):
+            self._best, self._at_best, self._restarts = best, len(self._evaluations), 0
+        if self._on_progress is not None:
+            seconds = time.monotonic() - self._began
+            self._on_progress(SearchProgress(seconds, len(self._evaluations), self._best, self.lower_bound))

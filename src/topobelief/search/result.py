@@ -1,0 +1,202 @@
+"""What a search over a roadmap found: the best way, others, the front of length against value, and the certificate."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from topobelief.arrays import FloatArray, ReadOnlyArrays, frozen_floats
+from topobelief.graph.action import Action
+from topobelief.search.front import spread_on_front
+
+_UNITS = {"error": "m", "per_pose": "nats per pose"}  # else nats
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Way(ReadOnlyArrays):
+    """One way through the roadmap.
+
+    Attributes
+    ----------
+    path : shape (waypoints, 2)
+        Metres, world frame; its waypoints are vertices of the roadmap. One waypoint: the robot stays where it is.
+    action : Action
+        What driving it adds to the graph; its cost is that of its length.
+    value : float
+        Exact objective after the action, cost included; metres for "error", else nats.
+    length : float
+        Metres.
+    """
+
+    path: FloatArray
+    action: Action
+    value: float
+    length: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "path", frozen_floats(self.path, name="path"))
+
+
+@dataclass(frozen=True, eq=False)
+class SearchResult(ReadOnlyArrays):
+    """The outcome of `search_roadmap`.
+
+    Values are in the unit of the objective: metres for "error", else nats. The smaller, the better.
+
+    Attributes
+    ----------
+    best : Way
+        The best way found; `path`, `action`, `value` and `length` are its.
+    alternatives : tuple of Way
+        Other ways, best first, each more than a twentieth of the length limit from the others (Fréchet).
+    on_front : tuple of Way
+        The best way found at each length, by increasing length and decreasing objective.
+    front : shape (F, 2)
+        Metres and objective of the ways on the front, cost excluded: what each further metre buys. `cost_per_metre` picks one.
+    lower_bound : float
+        No walk of the class has a smaller value, cost included; -inf where nothing is known.
+    covers : str
+        Which walks the lower bound covers, and which bound it is; empty where there is none.
+    proven_optimal : bool
+        Whether the lower bound meets the value, to rounding or to the gap that was asked for as 0.
+    value_now : float
+        The objective of the graph as it is.
+    shortest : Way or None
+        The shortest way to the goal; None without a goal.
+    max_length : float
+        Metres; the limit.
+    sees_map : bool
+        Whether any way that was evaluated would close a loop with the map.
+    num_evaluations : int
+        Exact evaluations made.
+    seconds : float
+        Time taken.
+    stopped_by : str
+        "proof", "gap", "deadline", "interrupt", or "rest" where neither value nor bound improved any more.
+    objective : str
+    cost_per_metre : float
+    """
+
+    best: Way
+    alternatives: tuple[Way, ...]
+    on_front: tuple[Way, ...]
+    front: FloatArray
+    lower_bound: float
+    covers: str
+    proven_optimal: bool
+    value_now: float
+    shortest: Way | None
+    max_length: float
+    sees_map: bool
+    num_evaluations: int
+    seconds: float
+    stopped_by: str
+    objective: str
+    cost_per_metre: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "front", frozen_floats(self.front, name="front"))
+
+    @property
+    def path(self) -> FloatArray:
+        """The best way found, shape (waypoints, 2), metres."""
+        return self.best.path
+
+    @property
+    def action(self) -> Action:
+        """What driving the best way adds to the graph."""
+        return self.best.action
+
+    @property
+    def value(self) -> float:
+        """Exact objective after the action, cost included."""
+        return self.best.value
+
+    @property
+    def length(self) -> float:
+        """Of the best way, metres."""
+        return self.best.length
+
+    @property
+    def gap(self) -> float:
+        """No walk of the class is better than the best way by more than this; inf where nothing is known."""
+        return max(0.0, self.value - self.lower_bound)
+
+    @property
+    def unit(self) -> str:
+        """Of values: "m", "nats" or "nats per pose"."""
+        return _UNITS.get(self.objective, "nats")
+
+    def summary(self) -> str:
+        """The result in a few sentences."""
+        return " ".join([self._what_was_found(), *self._comparison(), self._certificate()])
+
+    def _what_was_found(self) -> str:
+        if not self.sees_map:
+            return f"Nothing to gain within {self.max_length:.1f} m: no place in reach sees the map again."
+        if len(self.path) == 1:
+            return f"No trip of up to {self.max_length:.1f} m that was found is worth its way: stay."
+        closures = self.action.num_closures
+        noun = "loop closure" if closures == 1 else "loop closures"
+        after = said(self.best.value - self.best.action.cost, self.objective)
+        now = said(self.value_now, self.objective)
+        found = f"The best way found is {self.length:.1f} m long and closes {closures} {noun}"
+        return f"{found}: {_NAMES[self.objective]} {after}, now {now}."
+
+    def _comparison(self) -> list[str]:
+        if self.shortest is None or self.shortest.length >= self.length:
+            return []
+        shortest = said(self.shortest.value - self.shortest.action.cost, self.objective)
+        return [f"The shortest way, {self.shortest.length:.1f} m, leaves {shortest}."]
+
+    def _certificate(self) -> str:
+        if self.proven_optimal:
+            return "It is proven that no walk of the roadmap within the length is better."
+        if math.isinf(self.lower_bound):
+            return "Nothing is proven of other walks."
+        return f"No walk of the roadmap within the length is better by more than {said(self.gap, self.objective)}."
+
+    def __str__(self) -> str:
+        return self.summary()
+
+    def __repr__(self) -> str:
+        bound = "none" if math.isinf(self.lower_bound) else f"{self.lower_bound:.4g}"
+        return (
+            f"SearchResult({self.length:.1f} m, {self.action.num_closures} closures, "
+            f"{self.objective} {self.value:.4g} {self.unit}, bound {bound}, {len(self.alternatives)} alternatives)"
+        )
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the summary, and the front as a table."""
+        rows = "".join(
+            f"<tr><td>{metres:.1f}</td><td>{said(value, self.objective)}</td></tr>"
+            for metres, value in self.few_on_front(5).tolist()
+        )
+        head = f"<tr><th>up to (m)</th><th>{_NAMES[self.objective]}</th></tr>"
+        return f"<p>{self.summary()}</p><table>{head}{rows}</table>"
+
+    def few_on_front(self, count: int) -> FloatArray:
+        """Some points of the front that are spread over its lengths, its ends among them; shape (at most count, 2)."""
+        return self.front[spread_on_front(self.front[:, 0], count)]
+
+
+_NAMES = {
+    "error": "expected map error",
+    "map": "entropy of the map",
+    "joint": "joint entropy",
+    "per_pose": "joint entropy per pose",
+}
+
+
+def said(value: float, objective: str) -> str:
+    """A value with its unit as a person reads it: a length for errors, nats for entropies.
+
+    Examples
+    --------
+    >>> said(0.162, "error"), said(0.0029, "error"), said(12.34, "map")
+    ('16.2 cm', '2.90 mm', '12.3 nats')
+    """
+    if objective == "error":
+        small = f"{1000 * value:#.3g} mm" if 0 < abs(value) < 0.01 else f"{100 * value:#.3g} cm"
+        return small if abs(value) < 1 else f"{value:.2f} m"
+    return f"{value:.1f} {_UNITS.get(objective, 'nats')}" if objective != "per_pose" else f"{value:.3f} nats per pose"

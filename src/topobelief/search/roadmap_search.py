@@ -1,0 +1,263 @@
+"""The best walk of a whole roadmap, and how much better any other could be: the public door of the search.
+
+Local search (`local_search`) evaluates walks exactly and keeps the best at every length. A bound (`bound`) says which value no
+walk undercuts; its walks are candidates for local search, and the best value lets it leave out parts of the roadmap. `anytime`
+takes them in turns.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import time
+from collections.abc import Callable
+from importlib.util import find_spec
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import KDTree
+
+from topobelief.arrays import FloatArray
+from topobelief.candidates.closures import ClosureModel
+from topobelief.candidates.learned_closures import learn_closures
+from topobelief.candidates.predicted_factors import closure_information, default_information, predict_actions
+from topobelief.candidates.roadmap import Roadmap
+from topobelief.candidates.start import Start, find_start
+from topobelief.errors import InvalidInputError, PlanningError
+from topobelief.graph.action import Action
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.planning.planner import Planner
+from topobelief.search.anytime import AnytimeSearch, SearchProgress
+from topobelief.search.bound import WalkBound
+from topobelief.search.evaluations import Evaluations
+from topobelief.search.flow_bound import flow_bound
+from topobelief.search.front import on_front
+from topobelief.search.local_search import LocalSearch, spread_vias
+from topobelief.search.result import SearchResult, Way
+from topobelief.search.walks import Walk, Walks
+from topobelief.world import World
+
+_NUM_CANDIDATES = 60  # vertices to lead walks through
+_DIFFERENT = 0.05  # share of the length limit by which alternatives differ (Fréchet)
+_SAME_PLACE = 1e-9  # metres
+
+
+def search_roadmap(
+    graph: PoseGraph,
+    roadmap: Roadmap,
+    *,
+    goal: ArrayLike | None = None,
+    max_detour: float = 1.3,
+    max_length: float | None = None,
+    return_to_start: bool = False,
+    objective: str = "error",
+    closures: ClosureModel | None = None,
+    world: World | None = None,
+    cost_per_metre: float = 0.0,
+    deadline: float | None = None,
+    gap: float = 0.0,
+    num_alternatives: int = 10,
+    spacing: float = 1.0,
+    turn: float | None = None,
+    information: ArrayLike | None = None,
+    start: int | ArrayLike | Start | None = None,
+    earlier: SearchResult | None = None,
+    seed: int = 0,
+    on_progress: Callable[[SearchProgress], None] | None = None,
+) -> SearchResult:
+    """The walk on a roadmap after which the map is best, and how much better any other could be.
+
+    Parameters
+    ----------
+    graph
+        The robot's belief, at its estimate (`topobelief.optimize`).
+    roadmap
+        Its first vertex is where walks begin.
+    goal : shape (2,) or (3,), optional
+        Where walks end, metres; a heading is ignored. A place that is no vertex is joined to the roadmap. Default: walks end
+        anywhere.
+    max_detour
+        With a goal and without `max_length`: the limit in lengths of the shortest way, at least 1.
+    max_length
+        Metres; needed without a goal.
+    return_to_start
+        Without a goal: walks end where they begin.
+    objective
+        As for `Planner`.
+    closures
+        Which loops new poses close. Default: learned from the graph (`learn_closures`).
+    world
+        Where given, poses must see each other in it to close a loop.
+    cost_per_metre
+        In the unit of the objective: what a metre must gain to be worth driving.
+    deadline
+        Seconds from now, checked between batches of evaluations and steps of the bound; the best way so far is returned.
+    gap
+        Stop when no walk can be better by more than this, in the unit of the objective.
+    num_alternatives
+        How many other ways to return at most.
+    spacing, turn, information, start
+        As for `predict_actions`; by default new poses stand every metre, and not where the path turns. With a `turn` there is
+        no lower bound.
+    earlier
+        A result on the same roadmap whose ways are tried too: after a search with a smaller limit the value is never worse.
+    seed
+        The same seed gives the same result, unless the time runs out.
+    on_progress
+        Called after each batch and each step of the bound.
+
+    Returns
+    -------
+    SearchResult
+        After Ctrl-C too, once a way was evaluated: the best so far.
+
+    Raises
+    ------
+    PlanningError
+        Where the limit is below the shortest way to the goal, or the goal cannot be joined to the roadmap.
+    InvalidInputError
+        For a number out of range, without a goal and a `max_length`, and with a goal and `return_to_start`.
+
+    Warns
+    -----
+    NotOptimizedWarning
+        Where the graph is far from its estimate.
+    """
+    began = time.monotonic()
+    _check_numbers(max_detour, max_length, cost_per_metre, deadline, gap, num_alternatives)
+    walks = _walks_within(roadmap, goal, max_detour, max_length, return_to_start)
+    planner = Planner(graph, objective=objective, engine="incremental" if find_spec("numba") else "scratch")
+    model = learn_closures(graph, world=world) if closures is None else closures
+    of_odometry, of_closures = (
+        (default_information(graph), closure_information(graph)) if information is None else (np.asarray(information),) * 2
+    )
+    begin = find_start(graph, start, world=world)
+
+    def predict(paths: list[FloatArray]) -> list[Action]:
+        return predict_actions(
+            graph, paths, closures=model, information=information, spacing=spacing, turn=turn, world=world, start=begin
+        )
+
+    evaluations = Evaluations(planner, predict, walks.roadmap.vertices, cost_per_metre)
+    to_poses: FloatArray = np.asarray(KDTree(graph.positions[:, :2]).query(walks.roadmap.vertices)[0])
+    candidates = spread_vias(walks, to_poses < model.radius, _NUM_CANDIDATES)
+    local = LocalSearch(walks, evaluations, candidates, rng=np.random.default_rng(seed))
+
+    def bound() -> WalkBound:
+        return flow_bound(
+            graph,
+            walks.roadmap,
+            start=walks.start,
+            goal=None if goal is None else walks.end,
+            max_length=walks.max_length,
+            objective=objective,
+            closures=model,
+            spacing=spacing,
+            information=of_odometry,
+            closure_information=of_closures,
+            world=world,
+            cost_per_metre=cost_per_metre,
+            return_to_start=return_to_start,
+            pose=begin.pose,
+        )
+
+    make_bound = bound if turn is None else None  # it knows of no poses at corners
+    search = AnytimeSearch(evaluations, local, make_bound, began=began, deadline=deadline, gap=gap, on_progress=on_progress)
+    stopped_by = search.run([walks.walk(()), *_walks_of(earlier, walks.roadmap)])
+
+    def way(walk: Walk) -> Way:
+        return Way(evaluations.path(walk), evaluations.action(walk), evaluations.value(walk), evaluations.lengths[walk])
+
+    every, lengths, values = evaluations.arrays()
+    best = evaluations.best()
+    best_first: list[int] = [every.index(best), *np.argsort(values, kind="stable").tolist()]
+    others = evaluations.different(best_first, num_alternatives + 1, _DIFFERENT * walks.max_length)[1:]
+    objectives = values - cost_per_metre * lengths
+    front = on_front(lengths, objectives)
+    walks_on_front: list[Walk] = [every[index] for index in front.tolist()]
+    stay = Action(np.zeros((0, graph.poses.shape[1])), np.zeros((0, 2), np.int64), of_odometry)
+    return SearchResult(
+        best=way(best),
+        alternatives=tuple(way(walk) for walk in others),
+        on_front=tuple(map(way, walks_on_front)),
+        front=np.column_stack([lengths[front], objectives[front]]),
+        lower_bound=search.lower_bound,
+        covers=search.covers,
+        proven_optimal=search.proven,
+        value_now=float(planner.entropies([stay])[0]),
+        shortest=None if goal is None else way(walks.walk(())),
+        max_length=walks.max_length,
+        sees_map=evaluations.sees_map,
+        num_evaluations=len(evaluations),
+        seconds=time.monotonic() - began,
+        stopped_by=stopped_by,
+        objective=objective,
+        cost_per_metre=cost_per_metre,
+    )
+
+
+def _check_numbers(
+    max_detour: float,
+    max_length: float | None,
+    cost_per_metre: float,
+    deadline: float | None,
+    gap: float,
+    num_alternatives: int,
+) -> None:
+    if not max_detour >= 1:
+        raise InvalidInputError(f"expected max_detour of at least 1 times the shortest way, got {max_detour}")
+    if max_length is not None and not 0 <= max_length < math.inf:
+        raise InvalidInputError(f"expected a finite max_length of at least 0 m, got {max_length}")
+    if not 0 <= cost_per_metre < math.inf:
+        raise InvalidInputError(f"expected a finite cost_per_metre of at least 0, got {cost_per_metre}")
+    if deadline is not None and not deadline >= 0:
+        raise InvalidInputError(f"expected a deadline of at least 0 seconds, got {deadline}")
+    if not gap >= 0:
+        raise InvalidInputError(f"expected a gap of at least 0, got {gap}")
+    if num_alternatives < 0:
+        raise InvalidInputError(f"expected num_alternatives of at least 0, got {num_alternatives}")
+
+
+def _walks_within(
+    roadmap: Roadmap, goal: ArrayLike | None, max_detour: float, max_length: float | None, return_to_start: bool
+) -> Walks:
+    """The walks that are searched."""
+    if goal is None:
+        if max_length is None:
+            raise InvalidInputError("expected max_length for a trip without a goal, got none; say how many metres it may have")
+        return Walks(roadmap, 0 if return_to_start else None, max_length)
+    if return_to_start:
+        raise InvalidInputError("expected a goal or return_to_start, got both; leave out the goal to return to the start")
+    place = np.asarray(goal, dtype=np.float64)
+    if place.shape not in ((2,), (3,)) or not np.isfinite(place).all():
+        raise InvalidInputError(f"expected a finite goal (x, y) or (x, y, theta), got {goal!r}")
+    apart = np.linalg.norm(roadmap.vertices - place[:2], axis=1)
+    end = int(np.argmin(apart))
+    if apart[end] > _SAME_PLACE:
+        roadmap, end = roadmap.between(roadmap.vertices[0], place), 1
+    shortest = float(roadmap.distances_to(end)[0])
+    if math.isinf(shortest):
+        raise PlanningError(
+            f"expected a goal that the roadmap leads to, got ({place[0]:g}, {place[1]:g}); build a roadmap for it"
+        )
+    walks = Walks(roadmap, end, max_detour * shortest if max_length is None else max_length)
+    if shortest > walks.limit:
+        raise PlanningError(
+            f"expected max_length of at least {shortest:.2f} m, the shortest way to the goal, got {max_length:g} m; raise it"
+        )
+    return walks
+
+
+def _walks_of(earlier: SearchResult | None, roadmap: Roadmap) -> list[Walk]:
+    """The ways of an earlier result as walks on a roadmap; those that it does not have are left out."""
+    if earlier is None:
+        return []
+    tree, edges = KDTree(roadmap.vertices), {tuple(edge) for edge in roadmap.edges.tolist()}
+    walks: list[Walk] = []
+    for way in (earlier.best, *earlier.alternatives, *earlier.on_front):
+        distances, vertices = tree.query(way.path)
+        walk = tuple(np.atleast_1d(vertices).tolist())
+        joined = all((min(pair), max(pair)) in edges for pair in itertools.pairwise(walk))
+        if joined and np.max(distances) <= _SAME_PLACE:
+            walks.append(walk)
+    return walks

@@ -1,0 +1,291 @@
+"""The search over a whole roadmap: on small ones with all simple walks evaluated, and what its result promises."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+import topobelief as tb
+from small_roadmaps import OPEN, drive, simple_walks, small_roadmap, values_of
+from topobelief.candidates.roadmap import Roadmap
+from topobelief.errors import NotOptimizedWarning
+from topobelief.search.result import SearchResult
+
+CLOSURES = tb.ClosureModel(radius=1.5, max_per_pose=2, probability=1.0, min_index_gap=3)
+
+
+def scene(seed, *, num_vertices=11):
+    rng = np.random.default_rng(seed)
+    graph = drive(rng)
+    return graph, small_roadmap(rng, graph, num_vertices=num_vertices)
+
+
+def search(graph, roadmap, **options) -> SearchResult:
+    """By local search alone unless a bound is asked for: a turn of several rounds puts no pose at a corner."""
+    options = {"objective": "map", "closures": CLOSURES, "turn": 100.0, **options}
+    return tb.search_roadmap(graph, roadmap, **options)
+
+
+@pytest.fixture(scope="module")
+def found():
+    graph, roadmap = scene(3)
+    return graph, roadmap, search(graph, roadmap, goal=roadmap.vertices[1], max_detour=2.0)
+
+
+@pytest.mark.parametrize("objective", ["map", "error", "joint"])
+def test_no_simple_walk_to_the_goal_is_better(objective):
+    """Nearly always: here in each of these cases."""
+    for seed in (1, 3):
+        graph, roadmap = scene(seed)
+        limit = 1.8 * roadmap.distances_to(1)[0]
+        values = values_of(graph, roadmap, simple_walks(roadmap, limit, end=1), objective=objective, closures=CLOSURES)
+        result = search(graph, roadmap, goal=roadmap.vertices[1], max_length=limit, objective=objective)
+        assert result.value <= values.min() + 1e-9 * abs(values.min())
+
+
+def test_no_simple_walk_to_anywhere_is_better():
+    for seed in (2, 4):
+        graph, roadmap = scene(seed, num_vertices=7)
+        values = values_of(graph, roadmap, simple_walks(roadmap, 4.0), objective="map", closures=CLOSURES)
+        assert search(graph, roadmap, max_length=4.0).value <= values.min() + 1e-9 * abs(values.min())
+
+
+@pytest.mark.parametrize("objective", ["map", "error"])
+def test_the_bound_is_below_every_walk(objective):
+    graph, roadmap = scene(5, num_vertices=8)
+    limit = 1.5 * roadmap.distances_to(1)[0]
+    values = values_of(graph, roadmap, simple_walks(roadmap, limit, end=1), objective=objective, closures=CLOSURES)
+    result = search(graph, roadmap, goal=roadmap.vertices[1], max_length=limit, objective=objective, turn=None, deadline=2)
+    assert result.lower_bound <= values.min() + 1e-9 * abs(values.min())
+    assert result.lower_bound > -math.inf
+    assert "every walk" in result.covers
+    assert result.proven_optimal == (result.value - result.lower_bound <= 1e-9 * abs(result.value))
+
+
+@pytest.mark.parametrize("engine", ["scratch", "incremental"])
+@pytest.mark.parametrize("cost", [0.0, 0.7])
+def test_the_value_is_what_the_planner_says_of_the_action_with_its_cost(engine, cost):
+    graph, roadmap = scene(3)
+    result = search(graph, roadmap, goal=roadmap.vertices[1], max_detour=2.0, cost_per_metre=cost)
+    planner = tb.Planner(graph, objective="map", engine=engine)
+    for way in (result.best, *result.alternatives, *result.on_front):
+        assert planner.entropies([way.action])[0] + way.action.cost == pytest.approx(way.value, rel=1e-9)
+        assert way.action.cost == pytest.approx(cost * way.length)
+    assert result.value == result.best.value == min(way.value for way in (result.best, *result.alternatives))
+
+
+def test_the_action_is_the_predicted_one(found):
+    graph, _, result = found
+    (expected,) = tb.predict_actions(graph, [result.path], closures=CLOSURES, turn=None)
+    np.testing.assert_array_equal(result.action.edges, expected.edges)
+    np.testing.assert_allclose(result.action.poses, expected.poses)
+
+
+def test_ways_follow_edges_within_the_length_from_the_start_to_the_goal(found):
+    _, roadmap, result = found
+    edges = {tuple(edge) for edge in roadmap.edges.tolist()}
+    places = {tuple(place): index for index, place in enumerate(roadmap.vertices.tolist())}
+    for way in (result.best, *result.alternatives, *result.on_front):
+        walk = [places[tuple(place)] for place in way.path.tolist()]
+        assert walk[0] == 0
+        assert walk[-1] == 1
+        assert all(tuple(sorted(pair)) in edges for pair in itertools.pairwise(walk))
+        assert way.length <= result.max_length * (1 + 1e-9)
+        assert way.length == pytest.approx(np.linalg.norm(np.diff(way.path, axis=0), axis=1).sum())
+
+
+def test_the_front_falls_as_lengths_grow_from_the_shortest_way_to_the_best(found):
+    _, _, result = found
+    lengths, values = result.front.T
+    assert (np.diff(lengths) > 0).all()
+    assert (np.diff(values) < 0).all()
+    assert lengths[0] == pytest.approx(result.shortest.length)
+    assert values[-1] == pytest.approx(result.value, rel=1e-9)
+    assert [way.value for way in result.on_front] == pytest.approx(values.tolist())
+
+
+def test_alternatives_come_best_first_and_are_no_more_than_asked_for():
+    graph, roadmap = scene(3)
+    result = search(graph, roadmap, goal=roadmap.vertices[1], max_detour=2.0, num_alternatives=2)
+    values = [way.value for way in (result.best, *result.alternatives)]
+    assert values == sorted(values)
+    assert len(values) == 3
+
+
+def test_a_longer_limit_never_worsens_the_value_when_the_earlier_result_is_given():
+    graph, roadmap = scene(6, num_vertices=14)
+    result = None
+    for detour in (1.0, 1.3, 1.7, 2.2):
+        longer = search(graph, roadmap, goal=roadmap.vertices[1], max_detour=detour, earlier=result)
+        assert result is None or longer.value <= result.value
+        result = longer
+
+
+def test_without_a_goal_the_value_is_at_least_as_good_as_with_any():
+    graph, roadmap = scene(8, num_vertices=7)
+    free = search(graph, roadmap, max_length=4.0)
+    for goal in range(1, 4):
+        if roadmap.distances_to(goal)[0] <= 4.0:
+            assert free.value <= search(graph, roadmap, goal=roadmap.vertices[goal], max_length=4.0).value + 1e-9
+
+
+def test_a_trip_that_returns_ends_where_it_began():
+    graph, roadmap = scene(3)
+    result = search(graph, roadmap, max_length=6.0, return_to_start=True)
+    np.testing.assert_array_equal(result.path[0], result.path[-1])
+    assert len(result.path) > 1
+    assert result.length <= 6.0
+    assert result.value < result.value_now
+
+
+def test_a_cost_that_no_gain_is_worth_keeps_the_robot_where_it_is():
+    graph, roadmap = scene(3)
+    result = search(graph, roadmap, max_length=5.0, cost_per_metre=1e6)
+    assert result.path.tolist() == [roadmap.vertices[0].tolist()]
+    assert result.value == pytest.approx(result.value_now)
+    assert "stay" in result.summary()
+
+
+def test_relabelling_the_roadmap_changes_nothing():
+    graph, roadmap = scene(9)
+    result = search(graph, roadmap, goal=roadmap.vertices[1], max_detour=1.8)
+    order = np.r_[0, 1, 2 + np.random.default_rng(0).permutation(len(roadmap.vertices) - 2)]
+    rank = np.argsort(order)
+    edges = np.unique(np.sort(rank[roadmap.edges], axis=1), axis=0)
+    relabelled = Roadmap(roadmap.world, roadmap.robot_radius, roadmap.region, roadmap.vertices[order], edges)
+    again = search(graph, relabelled, goal=roadmap.vertices[1], max_detour=1.8)
+    assert again.value == pytest.approx(result.value, rel=1e-9)
+    np.testing.assert_allclose(again.path, result.path)
+
+
+def test_the_same_seed_gives_the_same_result():
+    graph, roadmap = scene(10)
+    one, two = (search(graph, roadmap, goal=roadmap.vertices[1], max_detour=1.8, turn=None) for _ in range(2))
+    np.testing.assert_array_equal(one.path, two.path)
+    np.testing.assert_array_equal(one.front, two.front)
+    assert one.lower_bound == two.lower_bound
+    assert one.num_evaluations == two.num_evaluations
+
+
+def test_where_nothing_is_seen_again_the_result_says_so():
+    graph = tb.PoseGraph([[x, 0, 0] for x in range(4)], [(0, 1), (1, 2), (2, 3)], None, np.eye(3) * 100)
+    vertices = np.array([(3, 0), (6, 0), (6, 2), (8, 1)], float)
+    roadmap = Roadmap(OPEN, 0.1, OPEN.component((0, 0), 0.1), vertices, np.array([(0, 1), (0, 2), (1, 2), (1, 3), (2, 3)]))
+    far = tb.ClosureModel(radius=0.5, probability=1.0)
+    result = search(graph, roadmap, max_length=5.0, closures=far)
+    assert not result.sees_map
+    assert result.path.tolist() == [[3, 0]]
+    assert result.summary().startswith("Nothing to gain within 5.0 m: no place in reach sees the map again.")
+    to_goal = search(graph, roadmap, goal=(8, 1), closures=far, max_detour=1.0)
+    assert to_goal.length == pytest.approx(to_goal.shortest.length)
+    assert "Nothing to gain" in to_goal.summary()
+
+
+def test_a_deadline_of_no_time_gives_the_shortest_way():
+    graph, roadmap = scene(3)
+    result = search(graph, roadmap, goal=roadmap.vertices[1], max_detour=2.0, deadline=0.0)
+    assert result.stopped_by == "deadline"
+    assert result.length == pytest.approx(roadmap.distances_to(1)[0])
+
+
+def test_an_interrupt_gives_the_best_so_far():
+    graph, roadmap = scene(3)
+    told = []
+
+    def interrupt(progress):
+        told.append(progress)
+        if len(told) == 2:
+            raise KeyboardInterrupt
+
+    result = search(graph, roadmap, goal=roadmap.vertices[1], max_detour=2.0, on_progress=interrupt)
+    assert result.stopped_by == "interrupt"
+    assert result.value == pytest.approx(told[-1].value)
+    assert told[-1].num_evaluations == result.num_evaluations
+
+
+def test_a_gap_that_is_good_enough_stops_the_search():
+    graph, roadmap = scene(3)
+    result = search(graph, roadmap, goal=roadmap.vertices[1], max_detour=2.0, gap=1e6, turn=None)
+    assert result.stopped_by in ("gap", "proof")
+    assert result.gap <= 1e6
+
+
+def test_a_goal_that_is_no_vertex_is_joined_to_the_roadmap():
+    world = tb.World.from_boxes([], bounds=(-4, -4, 8, 8))
+    graph = drive(np.random.default_rng(1), num_poses=4)
+    roadmap = tb.build_roadmap(world, graph.poses[-1], (3, 3), num_vertices=30, robot_radius=0.2)
+    result = search(graph, roadmap, goal=(2.5, 1.25, 0.3), world=None)
+    assert result.path[-1].tolist() == [2.5, 1.25]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({}, "expected max_length for a trip without a goal"),
+        ({"goal": (0.5, 0.5), "return_to_start": True, "max_length": 3.0}, "leave out the goal to return"),
+        ({"max_length": -1.0}, "expected a finite max_length of at least 0 m, got -1"),
+        ({"max_length": math.inf}, "expected a finite max_length"),
+        ({"max_length": 1.0, "cost_per_metre": -1.0}, "cost_per_metre of at least 0"),
+        ({"max_length": 1.0, "deadline": -1.0}, "deadline of at least 0 seconds"),
+        ({"max_length": 1.0, "gap": -1.0}, "gap of at least 0"),
+        ({"max_length": 1.0, "num_alternatives": -1}, "num_alternatives of at least 0"),
+        ({"max_length": 1.0, "objective": "beauty"}, "objective"),
+        ({"goal": (0.5, 0.5), "max_detour": 0.9}, "max_detour of at least 1"),
+        ({"goal": (math.nan, 0.5)}, "expected a finite goal"),
+    ],
+)
+def test_bad_input_is_named(options, message):
+    graph, roadmap = scene(3)
+    with pytest.raises(tb.TopobeliefError, match=message):
+        search(graph, roadmap, **options)
+
+
+def test_a_limit_below_the_shortest_way_is_refused_with_its_length():
+    graph, roadmap = scene(3)
+    shortest = roadmap.distances_to(1)[0]
+    with pytest.raises(tb.TopobeliefError, match=f"max_length of at least {shortest:.2f} m, the shortest way to the goal"):
+        search(graph, roadmap, goal=roadmap.vertices[1], max_length=0.9 * shortest)
+
+
+def test_a_goal_in_a_wall_is_refused():
+    world = tb.World.from_boxes([(1, 1, 2, 2)], bounds=(-4, -4, 8, 8))
+    graph = drive(np.random.default_rng(1), num_poses=4)
+    roadmap = tb.build_roadmap(world, graph.poses[-1], (3, 3), num_vertices=30, robot_radius=0.2)
+    with pytest.raises(tb.TopobeliefError, match="expected a goal with more clearance"):
+        search(graph, roadmap, goal=(1.5, 1.5))
+
+
+def test_a_graph_far_from_its_estimate_is_pointed_out():
+    poses = [[0, 0, 0], [1, 0, 0], [2, 0, 0]]
+    measured = [[5, 0, 0], [1, 0, 0], [2, 0, 0]]
+    graph = tb.PoseGraph(poses, [(0, 1), (1, 2), (0, 2)], measured, np.eye(3) * 1e4)
+    roadmap = Roadmap(OPEN, 0.1, OPEN.component((0, 0), 0.1), np.array([(2, 0), (3, 0), (3, 1.0)]), np.array([(0, 1), (1, 2)]))
+    with pytest.warns(NotOptimizedWarning):
+        search(graph, roadmap, max_length=2.0)
+
+
+def test_a_result_reads_well(found):
+    _, _, result = found
+    assert repr(result).startswith("SearchResult(")
+    assert len(repr(result)) < 140
+    assert str(result) == result.summary()
+    assert "The best way found is" in result.summary()
+    assert "<table>" in result._repr_html_()
+
+
+def test_the_bound_covers_closures_with_a_noise_of_their_own():
+    """A graph with many closures that are twenty times as exact as its odometry: predictions take each noise from its kind."""
+    rng = np.random.default_rng(5)
+    plain = drive(rng, num_poses=24)
+    chain = [(i, i + 1) for i in range(23)]
+    loops = [(i, i + 12) for i in range(12)]
+    omega = np.diag([100.0, 100.0, 400.0])
+    graph = tb.PoseGraph(plain.poses, chain + loops, None, np.stack([omega] * 23 + [20 * omega] * 12))
+    roadmap = small_roadmap(rng, graph, num_vertices=8)
+    limit = 1.5 * roadmap.distances_to(1)[0]
+    values = values_of(graph, roadmap, simple_walks(roadmap, limit, end=1), objective="map", closures=CLOSURES)
+    result = search(graph, roadmap, goal=roadmap.vertices[1], max_length=limit, turn=None, deadline=2)
+    assert result.lower_bound <= values.min() + 1e-9 * abs(values.min())
