@@ -10,7 +10,7 @@ from scipy.optimize import minimize
 
 from topobelief.arrays import FloatArray
 
-_ITERATIONS = 5
+_ITERATIONS = 8
 _TOLERANCE = 1e-6
 _ROUNDING = 1e-9  # relative
 _minimize = cast("Any", minimize)  # whose stub refuses constraints of several kinds
