@@ -57,7 +57,7 @@ def test_a_session_may_begin_with_a_recorded_graph(specification_file):
         ("seeds: 3", "seeds: 3\nseeds: 4", 11, "seeds: expected each key once, got 'seeds' twice"),
         ("[spanning_trees, random]", "[spanning_tree]", 8, "strategies[0]: expected one of spanning_trees, von_neumann"),
         ("[joint]", "[]", 9, "objectives: expected a list, got a list of 0"),
-        ("[joint]", "[entropy]", 9, "objectives[0]: expected one of joint, map, per_pose, got 'entropy'"),
+        ("[joint]", "[entropy]", 9, "objectives[0]: expected one of joint, map, per_pose, error, got 'entropy'"),
         ("1e-2", "0", 6, "noises[0].sigma_theta: expected a number above 0, got '0'"),
         ("1e-2", "tiny", 6, "noises[0].sigma_theta: expected a number above 0, got 'tiny'"),
         ("1e-2", ".nan", 6, "noises[0].sigma_theta: expected a number above 0"),
@@ -75,6 +75,7 @@ def test_a_session_may_begin_with_a_recorded_graph(specification_file):
         ("rule: {", "rule: {closures: lerned, ", 11, "rule.closures: expected one of learned, by hand, got 'lerned'"),
         ("line_of_sight: false", "line_of_sight: maybe", 11, "rule.line_of_sight: expected true or false, got 'maybe'"),
         ("rule: {", "rule: {radius: 2, ", 11, "rule.radius: expected 'robot_radius', got the unknown key 'radius'"),
+        ("[joint]\nseeds: 3\nrule: {", "[error]\nseeds: 3\nrule: {bounds: paper, ", 11, "rule.bounds: expected one of fischer"),
         ("rule: {", "rule: {{", 12, "expected YAML, got other text (while parsing a flow mapping expected "),
     ],
 )  # fmt: skip
