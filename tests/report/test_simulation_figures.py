@@ -6,6 +6,7 @@ import io
 import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from rich.console import Console
 
@@ -93,6 +94,14 @@ def test_entropies_are_shown_in_nats():
     assert "joint entropy, last leg" in shown(metrics_table(record))
 
 
+def test_candidates_that_leave_the_same_are_not_called_best_and_worst():
+    record = made_record()
+    each = replace(record.deliberations[0], values=np.zeros(2))
+    words = texts(draw_topologies(each, record.scenario.world, name="room"))
+    assert "Path 0 of 2, equal map error, chosen" in words
+    assert "Path 1 of 2, equal map error" in words
+
+
 def test_errors_are_shown_in_centimetres():
     record = made_record()
     predicted = 100 * record.legs[1].predicted_value
@@ -146,7 +155,7 @@ def test_a_run_in_words():
     record = made_record()
     metrics = run_metrics(record)
     table = shown(metrics_table(record))
-    assert f"{100 * metrics['error_slam']:.1f} cm on all poses" in table
+    assert f"{100 * metrics['error_slam']:.2f} cm on all poses" in table
     assert "0.036% of the time driven" in table
     assert leg_line(record.legs[1]) == (
         "goal 2: path 0 of 2 (10.0 m); arrived after 10.2 m in 20 s with 1 loop closures, "

@@ -27,6 +27,7 @@ _LEFT, _BOTTOM, _TOP, _RIGHT = 0.70, 0.50, 0.62, 0.15  # margins, inches, as all
 _MAP_AREA = 22.0  # of the map of a run
 _KEY_WIDTH, _KEY_LINE, _GAP = 2.3, 0.195, 0.20
 _ERRORS_HEIGHT, _ERRORS_GAP = 1.25, 0.60
+_TIE = 1e-9  # of the objective, within which candidates leave the same
 _ELLIPSES = 12  # along a run, about as far from one another
 _CONFIDENCE = math.sqrt(-2 * math.log(0.05))  # standard deviations of a plane's 95 % ellipse
 _TRUE, _ESTIMATE, _WHEELS, _DISTURBED = "#111111", style.BEST, style.SURVIVOR, "#CC79A7"
@@ -99,10 +100,11 @@ def draw_topologies(each: Deliberation, world: World, *, name: str) -> Figure:
     aspect = (y_max - y_min) / (x_max - x_min)
     width = min(4.2, math.sqrt(14 / aspect))
     height = width * aspect
+    words = ("least", "greatest") if np.ptp(values) > _TIE else ("equal", "equal")
     with style.style():
         canvas = Canvas(_LEFT + 2 * width + 0.45 + _RIGHT, _BOTTOM + height + _TOP + 0.62)
         bottom = _BOTTOM + 0.42
-        for place, (index, graph, word) in enumerate(zip((best, worst), graphs, ("least", "greatest"), strict=True)):
+        for place, (index, graph, word) in enumerate(zip((best, worst), graphs, words, strict=True)):
             left = _LEFT + place * (width + 0.45)
             panel = canvas.panel(left, bottom, width, height)
             _draw_world(panel, world)

@@ -51,7 +51,7 @@ def metrics_table(record: Record) -> Table:
         ("  wheel odometry", "wheel_odometry"),
     ):
         whole, before = values[f"error_{name}"], values[f"error_{name}_before"]
-        rows.append((label, f"{100 * whole:.1f} cm on all poses, {100 * before:.1f} cm on those before the last leg"))
+        rows.append((label, f"{cell(whole, 'm')} cm on all poses, {cell(before, 'm')} cm on those before the last leg"))
     if "predicted_value" in values:
         objective: Objective = chosen(OBJECTIVES, record.options.objective)
         unit, words = objective.unit, (("prior", "before"), ("predicted", "predicted"), ("achieved", "achieved"))
