@@ -53,7 +53,7 @@ def main() -> None:
     folder: Path = arguments.out / arguments.scenario
     for seed in range(arguments.seeds):
         if not (folder / f"{seed}" / "legs.json").exists():
-            options = RunOptions(seed=seed, objective="map")
+            options = RunOptions(seed=seed, strategy="spanning_trees", objective="map")
             keep(Episode(named_scenario(arguments.scenario), options).run(), folder / f"{seed}")
     runs = sorted(folder.glob("*/legs.json"), key=lambda file: int(file.parent.name))
     print(f"{arguments.scenario}: predicted / found, all decisions of a run together")

@@ -93,5 +93,6 @@ def test_a_summary_pairs_runs_by_seed():
     shortest, trees = summarised(runs, baseline="shortest")
     assert (shortest.gain, shortest.share_better, shortest.share_same) == (0.0, 0.0, 1.0)
     assert trees.gain == pytest.approx(1 - 1.5 / 2.5)
+    assert (shortest.saved, trees.saved) == (0.0, 0.25)
     assert (trees.share_better, trees.share_same) == (0.5, 0.25)
     assert np.isnan(summarised(runs, baseline="random")[0].gain)

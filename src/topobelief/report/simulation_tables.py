@@ -80,12 +80,12 @@ def comparison_table(found: Sequence[StrategySummary], *, baseline: str, unit: s
         padding=(0, 1),
         pad_edge=False,
         caption=f"medians over seeds; predicted: the objective of the chosen path, {shown_unit(unit)}; errors in centimetres, "
-        "means over redraws: of the map, the poses that stood before the session, and of all poses; gain: the map's error "
-        f"against {baseline}",
+        f"means over redraws: of the map, the poses that stood before the session, and of all poses; against {baseline}: "
+        "saved, of the map's error on the same seed, and gain, by which its median is lower",
         caption_justify="left",
     )
     table.add_column("strategy", no_wrap=True)
-    for name in ("arrived", "metres", "closures", "predicted", "map error", "error of all", "gain", "better", "same"):
+    for name in ("arrived", "metres", "closures", "predicted", "map error", "error of all", "saved", "gain", "better", "same"):
         table.add_column(name, justify="right", no_wrap=True)
     for each in found:
         table.add_row(
@@ -96,6 +96,7 @@ def comparison_table(found: Sequence[StrategySummary], *, baseline: str, unit: s
             cell(each.predicted, unit),
             f"{100 * each.error_shared:.1f}",
             f"{100 * each.error_all:.1f}",
+            cell(each.saved, "m"),
             _percent(each.gain),
             _percent(each.share_better),
             _percent(each.share_same),

@@ -106,6 +106,8 @@ class StrategySummary:
     num_runs, num_arrived
     planned, num_closures, predicted, error_shared, error_all, error_before
         Medians over the seeds.
+    saved
+        By how much error_shared is less than the baseline's on the same seed, metres, median.
     gain
         1 - median error_shared / that of the baseline.
     share_better
@@ -123,6 +125,7 @@ class StrategySummary:
     error_shared: float
     error_all: float
     error_before: float
+    saved: float
     gain: float
     share_better: float
     share_same: float
@@ -285,8 +288,9 @@ def summarised(runs: Sequence[ComparedRun], *, baseline: str = SHARED_STRATEGY) 
         pairs: FloatArray = np.array(
             [(run.error_shared, reference[run.seed].error_shared) for run in mine if run.seed in reference]
         )
-        gain = better = same = float("nan")
+        saved = gain = better = same = float("nan")
         if len(pairs):
+            saved = _median((pairs[:, 1] - pairs[:, 0]).tolist())
             gain = 1 - _median(pairs[:, 0].tolist()) / _median(pairs[:, 1].tolist())
             same = float(np.mean(np.equal(pairs[:, 0], pairs[:, 1])))
             better = float(np.mean(np.less(pairs[:, 0], pairs[:, 1])))
@@ -299,6 +303,7 @@ def summarised(runs: Sequence[ComparedRun], *, baseline: str = SHARED_STRATEGY) 
                 strategy=strategy,
                 num_runs=len(mine),
                 num_arrived=sum(run.outcome == "arrived" for run in mine),
+                saved=saved,
                 gain=gain,
                 share_better=better,
                 share_same=same,
