@@ -19,7 +19,7 @@ import numpy as np
 import topobelief as tb
 from topobelief.candidates.learned_closures import History
 from topobelief.candidates.predicted_factors import predict_actions
-from topobelief.simulation.episode import Episode, achieved_entropy
+from topobelief.simulation.episode import Episode, value_after
 from topobelief.simulation.front_end import FrontEndSettings
 from topobelief.simulation.record import Record, RunOptions
 from topobelief.simulation.scenario import SCENARIO_NAMES, named_scenario
@@ -53,7 +53,7 @@ def main() -> None:
     folder: Path = arguments.out / arguments.scenario
     for seed in range(arguments.seeds):
         if not (folder / f"{seed}" / "legs.json").exists():
-            options = RunOptions(seed=seed, objective="map")
+            options = RunOptions(seed=seed, strategy="spanning_trees", objective="map")
             keep(Episode(named_scenario(arguments.scenario), options).run(), folder / f"{seed}")
     runs = sorted(folder.glob("*/legs.json"), key=lambda file: int(file.parent.name))
     print(f"{arguments.scenario}: predicted / found, all decisions of a run together")
@@ -80,7 +80,7 @@ def keep(record: Record, folder: Path) -> None:
     for deliberation in record.deliberations:
         leg = record.history.legs[deliberation.leg]
         if leg.believed_arrived:
-            prior = deliberation.prior
+            prior = deliberation.question.graph
             name = f"prior{deliberation.leg}.g2o"
             if prior.num_edges:
                 tb.write_g2o(prior, folder / name)
@@ -135,7 +135,7 @@ def gains(prior: tb.PoseGraph, action: tb.Action, driven: tb.PoseGraph) -> tuple
     planner = tb.Planner(prior, objective="map")
     stay = tb.Action(np.zeros((0, 3)), np.zeros((0, 2), dtype=int), prior.information[0])
     before, predicted = planner.entropies([stay, action])
-    return float(before - predicted), float(before - achieved_entropy(driven, prior.num_poses, "map"))
+    return float(before - predicted), float(before - value_after(driven, prior.num_poses, "map"))
 
 
 def shown(row: Row) -> str:

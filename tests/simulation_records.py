@@ -6,22 +6,25 @@ from typing import Any
 
 import numpy as np
 
+from topobelief.candidates.polyline import path_length
 from topobelief.geometry import SE2_GROUP
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.planning.planner import Planner
 from topobelief.simulation.noise import InjectedNoise
 from topobelief.simulation.occupancy import OccupancyMap
 from topobelief.simulation.record import Deliberation, History, KeyPoses, Leg, Record, RunOptions
 from topobelief.simulation.scan import Scan
 from topobelief.simulation.scenario import Goal, Scenario
 from topobelief.strategies.choice import Choice, Reasons
+from topobelief.strategies.question import Question
 from topobelief.world import World
 
 INFORMATION = np.diag([100.0, 100.0, 816.0])
 
 
-def made_record(*, noise: InjectedNoise | None = None, outcome: str = "arrived", **changes: Any) -> Record:
+def made_record(
+    *, objective: str = "error", noise: InjectedNoise | None = None, outcome: str = "arrived", **changes: Any
+) -> Record:
     """A drive around a pillar in a room of 8 m: 4 poses to the first goal, 4 more to the second, and one closure."""
     world = World.from_boxes([(3, 3, 5, 5)], bounds=(0, 0, 8, 8))
     scenario = Scenario("room", world, (1.5, 1.5, 0.0), (Goal((6.5, 1.5), 2), Goal((1.5, 6.5), 2)))
@@ -37,8 +40,9 @@ def made_record(*, noise: InjectedNoise | None = None, outcome: str = "arrived",
         Action([[4, 2, 3.14], [1.5, 6.5, 3.14]], [(3, 4), (4, 5)], INFORMATION, label="path 2"),
     ]
     paths = [np.array([(6.5, 1.5), (6.5, 6.5), (1.5, 6.5)]), np.array([(6.5, 1.5), (1.5, 1.5), (1.5, 6.5)])]
-    entropies = Planner(prior).entropies(actions)
-    decision = Planner(prior).decide(actions)
+    question = Question(prior, actions, np.array([path_length(path) for path in paths]), np.zeros(2), objective)
+    values = question.values()
+    decision = question.planner().decide(actions)
     angles = np.linspace(-np.pi, np.pi, 8, endpoint=False)
     scans = tuple(
         Scan(np.where(angles == 0, np.nan, 1.0 + index / 10), angles, time=float(index), max_range=10.0) for index in range(8)
@@ -65,9 +69,9 @@ def made_record(*, noise: InjectedNoise | None = None, outcome: str = "arrived",
             planned=10.0,
             distance=10.2,
             num_closures=1,
-            prior_entropy=-9.0,
-            predicted_entropy=float(entropies[0]),
-            achieved_entropy=-20.0,
+            prior_value=-9.0,
+            predicted_value=float(values[0]),
+            achieved_value=-20.0,
             candidates_seconds=0.2,
             decision_seconds=0.01,
             driven_seconds=20.0,
@@ -79,7 +83,7 @@ def made_record(*, noise: InjectedNoise | None = None, outcome: str = "arrived",
     times = np.arange(8.0)
     fields: dict[str, Any] = {
         "scenario": scenario,
-        "options": RunOptions(noise=noise, seed=3),
+        "options": RunOptions(objective=objective, noise=noise, seed=3),
         "history": History(
             key_poses=KeyPoses(times=times, truth=truth, wheel_odometry=wheel, motions=truth, scans=scans),
             legs=legs,
@@ -92,10 +96,9 @@ def made_record(*, noise: InjectedNoise | None = None, outcome: str = "arrived",
         "deliberations": (
             Deliberation(
                 leg=1,
-                prior=prior,
+                question=question,
                 paths=paths,
-                actions=actions,
-                entropies=entropies,
+                values=values,
                 choice=Choice(decision.best, 0.01, Reasons.of(decision)),
             ),
         ),

@@ -47,6 +47,10 @@ def test_a_run_leaves_everything(topobelief, room, tmp_path):
     with (run / "key_poses.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert document["outcome"] == "arrived"
+    assert [document["options"][name] for name in ("objective", "strategy")] == ["error", "resistance"]
+    assert document["unit"] == json.loads((run / "leg-2.json").read_text())["unit"] == "m"
+    assert 0 < document["legs"][1]["predicted_value"] < document["legs"][1]["prior_value"] < 1
+    assert " cm on all poses" in outcome.out
     assert graph.num_poses == document["metrics"]["poses"] == len(rows)
     np.testing.assert_allclose([float(row["graph_x"]) for row in rows], graph.poses[:, 0], atol=1e-6)
     assert json.loads((run / "leg-2.json").read_text())["decision"]["schema"] == SCHEMA
@@ -70,6 +74,17 @@ def test_json_is_the_run(topobelief, room, tmp_path):
     assert outcome.code == 0
     assert json.loads(outcome.out) == json.loads((tmp_path / "run" / "run.json").read_text())
     assert not list((tmp_path / "run").glob("*.png"))
+
+
+def test_the_paper_decides_by_one_option(topobelief, room, tmp_path):
+    """All at once; options that are given beside it count."""
+    outcome = topobelief(["simulate", str(room), "--as-paper", "--strategy", "optimum", "--no-pictures", "--out", "run"])
+    assert outcome.code == 0, outcome.err
+    document = json.loads((tmp_path / "run" / "run.json").read_text())
+    assert [document["options"][name] for name in ("objective", "strategy")] == ["joint", "optimum"]
+    assert document["unit"] == "nats"
+    assert json.loads((tmp_path / "run" / "leg-2.json").read_text())["decision"]["objective"] == "joint"
+    assert "joint entropy" in outcome.out
 
 
 def test_an_interrupted_run_can_be_resumed(topobelief, room, tmp_path, monkeypatch):
@@ -104,6 +119,7 @@ def test_an_interrupted_run_can_be_resumed(topobelief, room, tmp_path, monkeypat
     [
         (["ofice"], "expected a scenario of office, lab, corridors"),
         (["office", "--strategy", "best"], "expected a strategy of spanning_trees"),
+        (["office", "--closures", "all"], "'all' is not one of"),
         (["office", "--noise", "loud"], "expected noise as"),
         (["office", "--max-detour", "0.5"], "expected a detour limit of at least 1"),
         (["office", "--displaced", "0.3"], "--displaced together with --resume"),

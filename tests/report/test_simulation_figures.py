@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import io
+import re
+from dataclasses import replace
 
+import numpy as np
 import pytest
 from rich.console import Console
 
@@ -75,11 +78,42 @@ def test_the_best_and_the_worst_topology():
     each = record.deliberations[0]
     figure = draw_topologies(each, record.scenario.world, name="room, leg 2")
     words = texts(figure)
-    best = int(each.entropies.argmin())
-    assert f"Path {best} of 2, least entropy, chosen" in words
-    assert f"Path {1 - best} of 2, greatest entropy" in words
-    assert f"{each.entropies.max():.1f} nats" in words
+    best = int(each.values.argmin())
+    assert f"Path {best} of 2, least map error, chosen" in words
+    assert f"Path {1 - best} of 2, greatest map error" in words
+    assert f"{100 * each.values.max():.2f} cm" in words
     assert "room, leg 2" in words
+
+
+def test_entropies_are_shown_in_nats():
+    record = made_record(objective="joint")
+    each = record.deliberations[0]
+    words = texts(draw_topologies(each, record.scenario.world, name="room"))
+    assert "least joint entropy" in words
+    assert f"{each.values.min():.2f} nats" in words
+    assert "joint entropy, last leg" in shown(metrics_table(record))
+
+
+def test_candidates_that_leave_the_same_are_not_called_best_and_worst():
+    record = made_record()
+    each = replace(record.deliberations[0], values=np.zeros(2))
+    words = texts(draw_topologies(each, record.scenario.world, name="room"))
+    assert "Path 0 of 2, equal map error, chosen" in words
+    assert "Path 1 of 2, equal map error" in words
+
+
+def test_errors_are_shown_in_centimetres():
+    record = made_record()
+    predicted = 100 * record.legs[1].predicted_value
+    assert re.search(rf"expected error of the map, last leg.*predicted {predicted:.2f}, .* cm", shown(metrics_table(record)))
+
+
+def test_what_strategies_are_called(runs):
+    others = {"shortest": "shortest", "spanning_trees": "spanning_trees:joint", "random": "hindsight"}
+    changed = [replace(run, strategy=others[run.strategy]) for run in runs]
+    words = texts(draw_comparison(changed, summarised(changed), baseline="shortest"))
+    assert "spanning trees (joint)" in words
+    assert "best in hindsight" in words
 
 
 @pytest.fixture
@@ -89,8 +123,10 @@ def runs() -> list[ComparedRun]:
         ComparedRun(
             seed=seed,
             strategy=strategy,
+            chosen=1,
+            num_candidates=2,
             planned=10.0,
-            entropy=-50.0,
+            predicted=0.1,
             error_shared=error + seed / 100,
             error_all=error,
             spread_shared=0.1,
@@ -103,13 +139,15 @@ def runs() -> list[ComparedRun]:
 
 
 def test_strategies_side_by_side(runs):
-    figure = draw_comparison(runs, baseline="shortest")
+    figure = draw_comparison(runs, summarised(runs), baseline="shortest")
     words = texts(figure)
     assert "better in 100%" in words
     assert "better in 0%" in words
     assert "spanning trees" in words
-    table = shown(comparison_table(summarised(runs, baseline="shortest"), baseline="shortest"))
+    table = shown(comparison_table(summarised(runs, baseline="shortest"), baseline="shortest", unit="m"))
     assert "4/4" in table
+    assert "10.00" in table  # 0.1 m predicted
+    assert "41.5" in table
     assert "24%" in table  # (0.415 - 0.315) / 0.415
 
 
@@ -117,7 +155,7 @@ def test_a_run_in_words():
     record = made_record()
     metrics = run_metrics(record)
     table = shown(metrics_table(record))
-    assert f"{metrics['error_slam']:.3f} m on all poses" in table
+    assert f"{100 * metrics['error_slam']:.2f} cm on all poses" in table
     assert "0.036% of the time driven" in table
     assert leg_line(record.legs[1]) == (
         "goal 2: path 0 of 2 (10.0 m); arrived after 10.2 m in 20 s with 1 loop closures, "

@@ -45,6 +45,12 @@ def test_a_panel_for_each_session_and_objective():
     assert {"S1 in office, joint entropy", "S2 in office, map entropy", "spanning trees"} <= texts
 
 
+def test_losses_of_error_are_centimetres():
+    figure = draw_losses([summary(objective="error"), summary()])
+    assert [axes.get_xlabel() for axes in figure.axes] == ["loss (nats)", "loss (cm)"]
+    assert lines(figure, 1)[2][0, 0] == pytest.approx(640)
+
+
 def test_shares_are_percent_with_their_interval():
     interval, _, _, dot = lines(draw_choices([summary()]))
     share = Share.of(9, 10)

@@ -38,7 +38,7 @@ def test_strategies_stand_under_their_session_the_best_first_and_failures_last()
     )
     names = [line.split()[0] for line in shown[2:8]]
     assert names == ["S1", "spanning_trees", "random", "optimum", "[S2]", "random"]
-    assert shown[2] == "S1 in office, map, ξ = 0.35"
+    assert shown[2] == "S1 in office, map (nats), ξ = 0.35"
     assert shown[3].split() == ["spanning_trees", "75%", "30–95", "0.12", "0.35", "–", "0.0", "12.5", "4", "–"]
     assert shown[5].split() == ["optimum", *["–"] * 8, "4"]
 

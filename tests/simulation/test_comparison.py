@@ -7,9 +7,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from topobelief.errors import InvalidInputError
 from topobelief.estimation import optimize
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.simulation.comparison import ComparedRun, redrawn_errors, restricted, summarised
+from topobelief.simulation.comparison import HINDSIGHT, ComparedRun, compared_strategy, redrawn_errors, restricted, summarised
 from topobelief.simulation.metrics import trajectory_error
 from topobelief.simulation.noise import InjectedNoise
 
@@ -52,17 +53,33 @@ def test_a_closure_lowers_the_expected_error(loop):
     assert closed.mean() < 0.8 * open_end.mean()
 
 
+@pytest.mark.parametrize("name", ["shortest", "path-3", "spanning_trees:joint", "optimum:error", HINDSIGHT])
+def test_what_can_be_compared(name):
+    assert compared_strategy(name) == name
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [("shortst", "a strategy of"), ("spanning_trees:entropy", "objective"), ("hindsight:map", 'got "hindsight"')],
+)
+def test_what_cannot_be_compared(name, message):
+    with pytest.raises(InvalidInputError, match=message):
+        compared_strategy(name)
+
+
 def run(seed: int, strategy: str, error: float) -> ComparedRun:
     return ComparedRun(
         seed=seed,
         strategy=strategy,
         outcome="arrived",
+        chosen=1,
+        num_candidates=2,
         planned=10.0,
         shortest=9.0,
         num_poses=30,
         num_shared=20,
         num_closures=4,
-        entropy=-50.0,
+        predicted=0.1,
         error_shared=error,
         error_all=error,
         spread_shared=0.0,
@@ -76,5 +93,6 @@ def test_a_summary_pairs_runs_by_seed():
     shortest, trees = summarised(runs, baseline="shortest")
     assert (shortest.gain, shortest.share_better, shortest.share_same) == (0.0, 0.0, 1.0)
     assert trees.gain == pytest.approx(1 - 1.5 / 2.5)
+    assert (shortest.saved, trees.saved) == (0.0, 0.25)
     assert (trees.share_better, trees.share_same) == (0.5, 0.25)
     assert np.isnan(summarised(runs, baseline="random")[0].gain)

@@ -11,7 +11,7 @@ import pytest
 from data_files import case_file
 from topobelief.candidates.closures import ClosureModel
 from topobelief.candidates.learned_closures import learn_closures
-from topobelief.simulation.episode import Episode, achieved_entropy
+from topobelief.simulation.episode import Episode, value_after
 from topobelief.simulation.front_end import FrontEndSettings
 from topobelief.simulation.lidar import LidarSettings
 from topobelief.simulation.metrics import run_metrics, trajectory_error
@@ -64,13 +64,13 @@ def test_closures_are_predicted_as_the_front_end_makes_them(physical):
     first, second = physical.deliberations
     rule = FrontEndSettings().expected_closures
     for deliberation in (first, second):
-        model = learn_closures(deliberation.prior, world=physical.scenario.world, rule=rule)
-        for action in deliberation.actions:
+        model = learn_closures(deliberation.question.graph, world=physical.scenario.world, rule=rule)
+        for action in deliberation.question.actions:
             if action.probabilities is not None:
                 assert action.probabilities[-1] == pytest.approx(model.probability)
             turns = np.diff(np.unwrap(action.poses[:, 2]))
             assert np.abs(turns).max(initial=0.0) <= FrontEndSettings().key_pose_angle * (1 + 1e-6)
-    assert any(action.num_closures for action in second.actions)
+    assert any(action.num_closures for action in second.question.actions)
 
 
 def test_the_papers_closures_are_a_choice(house):
@@ -80,7 +80,7 @@ def test_the_papers_closures_are_a_choice(house):
     episode = Episode(scenario, RunOptions(seed=1))
     record = episode.run(should_stop=lambda: True)
     (deliberation,) = record.deliberations
-    assert all(action.probabilities is None for action in deliberation.actions)
+    assert all(action.probabilities is None for action in deliberation.question.actions)
 
 
 def test_slam_is_better_than_wheels(physical):
@@ -96,9 +96,9 @@ def test_the_record_is_of_one_piece(physical):
     assert physical.legs[-1].last_pose == n - 1
     for each in physical.deliberations:
         leg = physical.legs[each.leg]
-        assert each.prior.num_poses == leg.first_pose + 1
-        assert leg.predicted_entropy == each.entropies[leg.chosen]
-        assert leg.planned == pytest.approx(each.lengths[leg.chosen])
+        assert each.question.graph.num_poses == leg.first_pose + 1
+        assert leg.predicted_value == each.values[leg.chosen]
+        assert leg.planned == pytest.approx(each.question.lengths[leg.chosen])
 
 
 def test_the_same_seed_is_the_same_run(house, injected):
@@ -143,8 +143,9 @@ def test_a_run_continues_where_another_ended(house, injected):
     continued = Episode(house, injected.options, history=part).run()
     assert continued.outcome == ARRIVED
     assert continued.legs[0] == injected.legs[0]
-    np.testing.assert_array_equal(continued.deliberations[0].prior.poses, injected.deliberations[1].prior.poses)
-    np.testing.assert_array_equal(continued.deliberations[0].entropies, injected.deliberations[1].entropies)
+    again, before = continued.deliberations[0], injected.deliberations[1]
+    np.testing.assert_array_equal(again.question.graph.poses, before.question.graph.poses)
+    np.testing.assert_array_equal(again.values, before.values)
 
 
 def test_a_run_continues_from_where_it_is_not(house, physical):
@@ -255,5 +256,5 @@ def test_a_leg_is_worth_what_its_factors_are(physical):
     from topobelief.entropy import joint_entropy
 
     n = physical.legs[-1].first_pose + 1
-    assert achieved_entropy(physical.graph, n, "joint") == pytest.approx(joint_entropy(physical.graph), abs=1e-6)
-    assert achieved_entropy(physical.graph, n, "map") != pytest.approx(joint_entropy(physical.graph), abs=1)
+    assert value_after(physical.graph, n, "joint") == pytest.approx(joint_entropy(physical.graph), abs=1e-6)
+    assert value_after(physical.graph, n, "map") != pytest.approx(joint_entropy(physical.graph), abs=1)

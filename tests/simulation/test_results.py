@@ -43,7 +43,7 @@ def test_a_history_returns_bit_for_bit(record, folder):
         np.testing.assert_array_equal(read.ranges, written.ranges)
         assert (read.time, read.max_range) == (written.time, written.max_range)
     assert history.legs[1] == record.legs[1]
-    assert np.isnan(history.legs[0].predicted_entropy)
+    assert np.isnan(history.legs[0].predicted_value)
 
 
 def test_files_agree_with_the_record(record, folder):

@@ -95,6 +95,24 @@ def test_a_name_that_is_none_is_refused():
         scenario_of("ofice")
 
 
+def test_decisions_are_by_error_or_as_a_file_says(folder):
+    least = "map: walls.csv\nstart: [1, 1]\ngoals: [[9, 9]]\n"
+    for text, decision in (
+        ("", ("error", None, None)),
+        ("as_paper: true\n", ("joint", "spanning_trees", ClosureModel.paper())),
+        ("as_paper: true\nobjective: map\nclosures: learned\n", ("map", "spanning_trees", None)),
+        ("strategy: optimum\n", ("error", "optimum", None)),
+    ):
+        scenario = scenario_of(write(folder, least + text))
+        assert (scenario.objective, scenario.strategy, scenario.rule.closures) == decision
+    for text, message in (
+        ("objective: entropy\n", ":4: objective: expected one of joint, map, per_pose, error, got 'entropy'"),
+        ("strategy: best\n", ":4: strategy: expected a strategy of"),
+    ):
+        with pytest.raises(FileError, match=message):
+            scenario_of(write(folder, least + text))
+
+
 def test_detour_limits():
     office = scenario_of("office")
     assert with_detour(office, None).rule.max_detour == 1.3

@@ -18,7 +18,8 @@ from topobelief.runs.in_process import InProcess
 from topobelief.runs.local_workers import LocalWorkers
 from topobelief.runs.run import UnfinishedRunError
 from topobelief.simulation import strategy_comparison
-from topobelief.simulation.comparison import ComparedRun
+from topobelief.simulation.comparison import HINDSIGHT, ComparedRun
+from topobelief.simulation.episode import Episode
 from topobelief.simulation.noise import InjectedNoise
 from topobelief.simulation.record import RunOptions
 from topobelief.simulation.strategy_comparison import ComparisonTask, SeedTask, compare, play
@@ -50,6 +51,28 @@ def test_strategies_of_a_seed_share_the_start(task):
     assert shortest.planned == shortest.shortest < second.planned
     assert shortest.num_shared == 1
     assert shortest.error_shared < 1e-9 < shortest.error_all
+
+
+def test_each_candidate_is_driven_once(task, monkeypatch):
+    """Strategies that choose the same path share its drive, and hindsight drives the rest."""
+    driven = []
+    drive = Episode.run
+    monkeypatch.setattr(Episode, "run", lambda episode, **options: driven.append(episode) or drive(episode, **options))
+    names = ("shortest", "optimum", "spanning_trees:joint", HINDSIGHT)
+    runs = play(SeedTask(replace(task, strategies=names), 0))
+    assert len(driven) == 2
+    by_name = {run.strategy: run for run in runs}
+    assert list(by_name) == [*names, "path-0", "path-1"]
+    assert replace(by_name["path-0"], strategy="shortest") == by_name["shortest"]
+    assert [by_name[name].chosen for name in ("path-0", "path-1")] == [0, 1]
+    assert by_name[HINDSIGHT].error_shared == min(by_name[f"path-{k}"].error_shared for k in range(2))
+
+
+def test_the_summary_is_of_the_strategies_that_were_asked_for(task, tmp_path, monkeypatch):
+    monkeypatch.setattr(strategy_comparison, "play", lambda seed: [*quick(seed), replace(quick(seed)[0], strategy="path-7")])
+    found = compare(task, 1, tmp_path, InProcess())
+    assert [run.strategy for run in found.runs] == ["shortest", "path-1", "path-7"]
+    assert [each.strategy for each in found.summaries] == ["shortest", "path-1"]
 
 
 def test_physical_noise_is_refused(task):

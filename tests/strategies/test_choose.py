@@ -10,7 +10,7 @@ from topobelief.candidates.predicted_factors import predict_actions
 from topobelief.errors import InvalidInputError
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.planner import Planner
-from topobelief.planning.registry import SIGNATURES, imported
+from topobelief.planning.registry import OBJECTIVES, SIGNATURES, imported
 from topobelief.strategies import choose as choose_module
 from topobelief.strategies.choice import Reasons
 from topobelief.strategies.choose import choose
@@ -38,7 +38,7 @@ def chosen(question, strategy, *, objective="joint", seed=0):
     return choose(strategy, Question(*question, np.random.default_rng(seed).random(3), objective))
 
 
-@pytest.mark.parametrize("objective", ["joint", "map", "per_pose"])
+@pytest.mark.parametrize("objective", list(OBJECTIVES))
 def test_those_that_evaluate_find_the_least_objective(question, objective):
     graph, actions, _ = question
     best = int(np.argmin(Planner(graph, objective=objective).entropies(actions)))
@@ -50,7 +50,7 @@ def test_those_that_evaluate_find_the_least_objective(question, objective):
     assert optimum.reasons.scores is None
 
 
-@pytest.mark.parametrize("objective", ["joint", "map", "per_pose"])
+@pytest.mark.parametrize("objective", list(OBJECTIVES))
 def test_reasons_hold(question, objective):
     """The bounds of a choice contain its objective, and no candidate is better by more than the error bound."""
     graph, actions, _ = question
@@ -120,6 +120,13 @@ def test_a_ranking_computes_bounds_only_as_reasons(question, monkeypatch):
     assert proofs == ["none"]
     assert isinstance(reasons(), Reasons)
     assert proofs == ["none", "bounded"]
+
+
+def test_a_question_knows_its_signature_and_unit(question):
+    asked = Question(*question, np.zeros(3), "error")
+    assert asked.unit == "m"
+    assert asked.planner().decide(asked.actions).signature == "resistance"
+    assert chosen(question, "optimum", objective="joint").decision.signature == "spanning_trees"
 
 
 @pytest.mark.parametrize("signature", ["spanning_trees", "von_neumann", "von_neumann_approx"])

@@ -75,6 +75,7 @@ def test_a_session_may_begin_with_a_recorded_graph(specification_file):
         ("rule: {", "rule: {closures: lerned, ", 11, "rule.closures: expected one of learned, by hand, got 'lerned'"),
         ("line_of_sight: false", "line_of_sight: maybe", 11, "rule.line_of_sight: expected true or false, got 'maybe'"),
         ("rule: {", "rule: {radius: 2, ", 11, "rule.radius: expected 'robot_radius', got the unknown key 'radius'"),
+        ("[joint]\nseeds: 3\nrule: {", "[error]\nseeds: 3\nrule: {bounds: paper, ", 11, "rule.bounds: expected one of fischer"),
         ("rule: {", "rule: {{", 12, "expected YAML, got other text (while parsing a flow mapping expected "),
     ],
 )  # fmt: skip

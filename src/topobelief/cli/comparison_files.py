@@ -9,9 +9,10 @@ from pathlib import Path
 from topobelief.cli.plan_files import write_together
 from topobelief.io.json_values import without_nan
 from topobelief.io.row_files import csv_text
+from topobelief.planning.registry import unit_of
 from topobelief.report.canvas import save_figure
 from topobelief.report.simulation_figures import draw_comparison
-from topobelief.simulation.comparison import ComparedRun, summarised
+from topobelief.simulation.comparison import ComparedRun
 from topobelief.simulation.strategy_comparison import Comparison
 
 
@@ -19,7 +20,8 @@ def document(found: Comparison) -> dict[str, object]:
     """For JSON; None stands for what is not a number."""
     return {
         "task": found.task.described(),
-        "strategies": [without_nan(asdict(each)) for each in summarised(found.runs, baseline=found.task.strategies[0])],
+        "unit": unit_of(found.task.options.objective),
+        "strategies": [without_nan(asdict(each)) for each in found.summaries],
         "runs": [without_nan(asdict(run)) for run in found.runs],
         "failed": [{"seed": seed, "error": error} for seed, error in found.failed.items()],
     }
@@ -27,7 +29,7 @@ def document(found: Comparison) -> dict[str, object]:
 
 def write(folder: Path, found: Comparison) -> None:
     """The runs, the summary and the picture."""
-    figure = draw_comparison(list(found.runs), baseline=found.task.strategies[0])
+    figure = draw_comparison(found.runs, found.summaries, baseline=found.task.strategies[0])
     summary, runs = json.dumps(document(found), indent=2, allow_nan=False) + "\n", csv_text(ComparedRun, found.runs)
     write_together(
         folder,

@@ -88,12 +88,13 @@ def plan(
         )
         from topobelief.cli.closure_options import stated_closures, told_closures
         from topobelief.planning.planner import Planner
+        from topobelief.planning.registry import default_signature
 
     folder = plan_files.checked_folder(out if out is not None or as_json else Path("out"))
     path_file = plan_files.checked_path_file(write_path)
     limit = max_detour if max_detour is not None else math.inf if as_paper else 1.3
     objective = objective or ("joint" if as_paper else "error")
-    signature = signature or ("resistance" if objective == "error" else "spanning_trees")
+    signature = signature or default_signature(objective)
     bounds = bounds or ("fischer" if as_paper else "auto")
     proof = proof or ("bounded" if as_paper or margin is not None else "optimal")
     rule = CandidateRule(

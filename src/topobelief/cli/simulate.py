@@ -3,47 +3,65 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
 from topobelief.cli.choices import completed, one_of
 from topobelief.cli.run_options import DEFAULT_TIMEOUT, RetryFailed, Timeout
-from topobelief.planning.registry import OBJECTIVES
+from topobelief.planning.registry import OBJECTIVES, default_signature, unit_of
 
 _SCENARIO_HELP = "office, lab, corridors, or a .yaml of your own."
+ObjectiveName = Annotated[
+    str | None,
+    typer.Option(
+        callback=one_of(OBJECTIVES),
+        autocompletion=completed(OBJECTIVES),
+        help="What to minimise: error, the expected error of the map; or an entropy: joint, of all poses (the paper's); "
+        "map, of existing poses; per_pose.",
+        show_default="the scenario's: error",
+    ),
+]
+ClosuresName = Annotated[
+    Literal["learned", "paper"] | None,
+    typer.Option(
+        help="Loop closures to predict: learned, as the robot's own front end makes them; or by the rule of the paper.",
+        show_default="the scenario's: learned",
+    ),
+]
+AsPaper = Annotated[
+    bool,
+    typer.Option("--as-paper", help="Decide as in the paper, unless other options are given: joint, spanning_trees, paper."),
+]
+MaxDetour = Annotated[
+    float | None,
+    typer.Option(
+        metavar="FACTOR",
+        help="Longest path, as a multiple of the shortest; 0 for no limit.",
+        show_default="the scenario's",
+        min=0,
+    ),
+]
 _NOISE_HELP = 'physical; or injected: the ratio ξ = σ_θ/σ_p at σ_p = 0.1 m, such as 0.35, or "σ_p,σ_θ" in m and rad.'
 
 
 def simulate(
     scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help=_SCENARIO_HELP)],
     strategy: Annotated[
-        str,
+        str | None,
         typer.Option(
-            help="spanning_trees, von_neumann_approx, von_neumann, optimum (proven), standard (all exact), shortest, random, "
-            "or path-k: path-0 is the shortest, path-1 the next."
+            help="A signature: resistance, spanning_trees, von_neumann_approx or von_neumann; optimum (proven), standard (all "
+            "exact), shortest, random, or path-k: path-0 is the shortest path, path-1 the next.",
+            show_default="resistance for error, else spanning_trees",
         ),
-    ] = "spanning_trees",
-    objective: Annotated[
-        str,
-        typer.Option(
-            callback=one_of(OBJECTIVES),
-            autocompletion=completed(OBJECTIVES),
-            help="Entropy to minimise: of all poses (the paper's), of existing poses, or per pose.",
-        ),
-    ] = "joint",
+    ] = None,
+    objective: ObjectiveName = None,
+    closures: ClosuresName = None,
+    as_paper: AsPaper = False,
     seed: Annotated[int, typer.Option(min=0, help="Random seed; the same seed gives the same run.")] = 0,
     noise: Annotated[str, typer.Option(help=_NOISE_HELP)] = "physical",
     unknown: Annotated[bool, typer.Option("--unknown", help="Start with an empty map instead of the floor plan.")] = False,
-    max_detour: Annotated[
-        float | None,
-        typer.Option(
-            metavar="FACTOR",
-            help="Longest path, as a multiple of the shortest; 0 for no limit.",
-            show_default="the scenario's",
-            min=0,
-        ),
-    ] = None,
+    max_detour: MaxDetour = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the run in --out from its last key pose.")] = False,
     displaced: Annotated[
         float, typer.Option(help="With --resume: how far ahead of its estimate the robot stands, metres.")
@@ -74,16 +92,18 @@ def simulate(
         from topobelief.simulation.noise import parse_noise
         from topobelief.simulation.record import INTERRUPTED, RunOptions
         from topobelief.simulation.results import read_history, run_document
-        from topobelief.simulation.scenario_file import scenario_of, with_detour
+        from topobelief.simulation.scenario_file import as_in_paper, scenario_of, with_closures, with_detour
         from topobelief.strategies.registry import checked_strategy
 
         if displaced and not resume:
             raise InvalidInputError("expected --displaced together with --resume, got it alone")
-        place = with_detour(scenario_of(scenario), max_detour)
+        place = scenario_of(scenario)
+        place = with_closures(with_detour(as_in_paper(place) if as_paper else place, max_detour), closures)
         if place.caution:
             reporter.warn(place.caution)
+        objective = objective or place.objective
         options = RunOptions(
-            strategy=checked_strategy(strategy),
+            strategy=checked_strategy(strategy) if strategy else place.strategy or default_signature(objective),
             objective=objective,
             seed=seed,
             noise=parse_noise(noise),
@@ -117,24 +137,20 @@ def simulate(
 
 def simulate_compare(
     scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help=_SCENARIO_HELP)],
-    strategies: Annotated[str, typer.Option(help="Comma-separated; the others are compared with the first.")] = (
-        "shortest,spanning_trees"
-    ),
-    objective: Annotated[
-        str, typer.Option(callback=one_of(OBJECTIVES), autocompletion=completed(OBJECTIVES), help="As in simulate.")
-    ] = "joint",
+    strategies: Annotated[
+        str | None,
+        typer.Option(
+            help="Comma-separated; the others are compared with the first. As in simulate; with an objective of its own, as "
+            "in spanning_trees:joint; or hindsight, which drives all candidates and takes the best.",
+            show_default="shortest and the default of simulate",
+        ),
+    ] = None,
+    objective: ObjectiveName = None,
+    closures: ClosuresName = None,
     seeds: Annotated[int, typer.Option(min=1, help="Number of seeds, starting at 0.")] = 20,
     noise: Annotated[str, typer.Option(help="Injected noise, as in simulate; redrawn for each graph.")] = "0.35",
     redraws: Annotated[int, typer.Option(min=1, help="Noise draws for each recorded graph.")] = 50,
-    max_detour: Annotated[
-        float | None,
-        typer.Option(
-            metavar="FACTOR",
-            help="Longest path, as a multiple of the shortest; 0 for no limit.",
-            show_default="the scenario's",
-            min=0,
-        ),
-    ] = None,
+    max_detour: MaxDetour = None,
     workers: Annotated[int, typer.Option(min=1, help="Number of processes.")] = 1,
     timeout: Timeout = DEFAULT_TIMEOUT,
     retry_failed: RetryFailed = False,
@@ -160,30 +176,32 @@ def simulate_compare(
         from topobelief.cli.plan_files import checked_folder
         from topobelief.report.simulation_tables import comparison_table
         from topobelief.runs.local_workers import LocalWorkers
-        from topobelief.simulation.comparison import summarised
+        from topobelief.simulation.comparison import compared_strategy
         from topobelief.simulation.noise import parse_noise
         from topobelief.simulation.record import RunOptions
         from topobelief.simulation.scenario_file import scenario_of
         from topobelief.simulation.strategy_comparison import ComparisonTask, compare
-        from topobelief.strategies.registry import checked_strategy
 
-        names = tuple(dict.fromkeys(checked_strategy(name.strip()) for name in strategies.split(",")))
+        place = scenario_of(scenario)
+        objective = objective or place.objective
+        given = (strategies or f"shortest,{place.strategy or default_signature(objective)}").split(",")
+        names = tuple(dict.fromkeys(compared_strategy(name.strip()) for name in given))
         task = ComparisonTask(
             scenario=scenario,
             max_detour=max_detour,
             strategies=names,
             options=RunOptions(objective=objective, noise=parse_noise(noise)),
             num_redraws=redraws,
+            closures=closures,
         )
         folder = out or Path("out") / f"compare-{Path(scenario).stem}"
         checked_folder(folder)
-        caution = scenario_of(scenario).caution
-        if caution:
-            reporter.warn(caution)
+        if place.caution:
+            reporter.warn(place.caution)
     executor = LocalWorkers(workers, max_seconds=timeout or None)
     with reporter.run("driving", "seeds") as progress:
         found = compare(task, seeds, folder, executor, retry_failed=retry_failed, on_progress=progress.update)
-    reporter.say(comparison_table(summarised(found.runs, baseline=names[0]), baseline=names[0]))
+    reporter.say(comparison_table(found.summaries, baseline=names[0], unit=unit_of(objective)))
     if found.failed:
         seed, error = next(iter(found.failed.items()))
         reporter.say(f"{len(found.failed)} of {seeds} seeds failed and are left out; seed {seed}: {error}")

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from difflib import get_close_matches
 from pathlib import Path
 from typing import NoReturn, cast
 
 import yaml
 
-from topobelief.errors import FileError
+from topobelief.errors import FileError, InvalidInputError
 from topobelief.io.files import StrPath, read_text
 
 
@@ -95,6 +95,13 @@ class Field:
         if value not in choices:
             self.refuse(listed)
         return value
+
+    def checked(self, check: Callable[[str], str]) -> str:
+        """A text that a function takes and gives back, or refuses."""
+        try:
+            return check(self.text())
+        except InvalidInputError as error:
+            raise FileError(self._path, f"{self.name}: {error}", line=self.line) from None
 
     def flag(self) -> bool:
         """Yes or no."""

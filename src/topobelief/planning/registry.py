@@ -51,6 +51,27 @@ AUTO = "auto"
 """Bounds and engine may be left to the planner."""
 
 
+def default_signature(objective: str) -> str:
+    """The signature that ranks actions for an objective where no other is named.
+
+    Examples
+    --------
+    >>> default_signature("error"), default_signature("joint")
+    ('resistance', 'spanning_trees')
+    """
+    return "resistance" if objective == "error" else "spanning_trees"
+
+
+def has_bounds(objective: str, family: str) -> bool:
+    """Whether there are bounds of an objective by a family; those that are left to the planner there always are."""
+    return family == AUTO or family in FAMILIES[chosen(OBJECTIVES, objective).argument]
+
+
+def unit_of(objective: str) -> str:
+    """Of an objective, by name (`planning.units` says how its numbers are shown)."""
+    return chosen(OBJECTIVES, objective).unit
+
+
 def chosen(choices: Mapping[str, str], name: str) -> Any:
     """What a name stands for."""
     return imported(choices[name])

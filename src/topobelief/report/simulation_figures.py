@@ -13,18 +13,21 @@ from matplotlib.figure import Figure
 from topobelief.arrays import FloatArray
 from topobelief.graph.action import posterior
 from topobelief.graph.pose_graph import PoseGraph
+from topobelief.planning.units import cell, shown_unit
 from topobelief.report import style
 from topobelief.report.canvas import Canvas, Entry, Panel
-from topobelief.report.study_figures import STRATEGY_NAMES
-from topobelief.simulation.comparison import ComparedRun, summarised
+from topobelief.report.study_figures import OBJECTIVE_NAMES, STRATEGY_NAMES
+from topobelief.simulation.comparison import HINDSIGHT, ComparedRun, StrategySummary
 from topobelief.simulation.metrics import chained, from_start, position_covariances
 from topobelief.simulation.record import Deliberation, Record
+from topobelief.wording import closures_in_words, counted
 from topobelief.world import World
 
 _LEFT, _BOTTOM, _TOP, _RIGHT = 0.70, 0.50, 0.62, 0.15  # margins, inches, as all lengths here
 _MAP_AREA = 22.0  # of the map of a run
 _KEY_WIDTH, _KEY_LINE, _GAP = 2.3, 0.195, 0.20
 _ERRORS_HEIGHT, _ERRORS_GAP = 1.25, 0.60
+_TIE = 1e-9  # of the objective, within which candidates leave the same
 _ELLIPSES = 12  # along a run, about as far from one another
 _CONFIDENCE = math.sqrt(-2 * math.log(0.05))  # standard deviations of a plane's 95 % ellipse
 _TRUE, _ESTIMATE, _WHEELS, _DISTURBED = "#111111", style.BEST, style.SURVIVOR, "#CC79A7"
@@ -89,33 +92,35 @@ def draw_topologies(each: Deliberation, world: World, *, name: str) -> Figure:
     name
         Of the decision.
     """
-    best, worst = int(np.argmin(each.entropies)), int(np.argmax(each.entropies))
-    graphs = [posterior(each.prior, each.actions[index]) for index in (best, worst)]
+    question, values = each.question, each.values
+    best, worst = int(np.argmin(values)), len(values) - 1 - int(np.argmax(values[::-1]))  # of equal ones the longest is worst
+    graphs = [posterior(question.graph, question.actions[index]) for index in (best, worst)]
     every = [graph.poses for graph in graphs]
     x_min, y_min, x_max, y_max = _extent(every, world)
     aspect = (y_max - y_min) / (x_max - x_min)
     width = min(4.2, math.sqrt(14 / aspect))
     height = width * aspect
+    words = ("least", "greatest") if np.ptp(values) > _TIE else ("equal", "equal")
     with style.style():
         canvas = Canvas(_LEFT + 2 * width + 0.45 + _RIGHT, _BOTTOM + height + _TOP + 0.62)
         bottom = _BOTTOM + 0.42
-        for place, (index, graph, word) in enumerate(zip((best, worst), graphs, ("least", "greatest"), strict=True)):
+        for place, (index, graph, word) in enumerate(zip((best, worst), graphs, words, strict=True)):
             left = _LEFT + place * (width + 0.45)
             panel = canvas.panel(left, bottom, width, height)
             _draw_world(panel, world)
-            key = _draw_topology(panel, graph, each.prior.num_poses)
+            key = _draw_topology(panel, graph, question.graph.num_poses)
             panel.limits((x_min, x_max), (y_min, y_max))
             panel.map_axes()
             if place:
                 panel.axes.set_ylabel("")
             chosen = ", chosen" if index == each.choice.index else ""
-            action = each.actions[index]
+            action = question.actions[index]
             canvas.title(
                 left,
                 bottom + height + 0.08,
-                f"Path {index} of {len(each.paths)}, {word} entropy{chosen}",
-                f"{each.entropies[index]:.1f} nats, {each.lengths[index]:.1f} m, {action.num_new_poses} poses, "
-                f"{len(action.edges) - action.num_new_poses} closures",
+                f"Path {index} of {len(each.paths)}, {word} {_quantity(question.objective)}{chosen}",
+                f"{cell(values[index], question.unit)} {shown_unit(question.unit)}, {question.lengths[index]:.1f} m, "
+                f"{counted(action.num_new_poses, 'pose')}, {closures_in_words(action.num_closures, action.expected_closures)}",
             )
             if place == 0:
                 canvas.key(key, _LEFT, 0.08, corner="lower left", columns=len(key))
@@ -123,9 +128,9 @@ def draw_topologies(each: Deliberation, world: World, *, name: str) -> Figure:
     return canvas.figure
 
 
-def draw_comparison(runs: Sequence[ComparedRun], *, baseline: str) -> Figure:
+def draw_comparison(runs: Sequence[ComparedRun], summaries: Sequence[StrategySummary], *, baseline: str) -> Figure:
     """Expected error of each strategy beside the baseline's on the same seed: one row per strategy, one dot per seed."""
-    found = [each for each in summarised(runs, baseline=baseline) if each.strategy != baseline]
+    found = [each for each in summaries if each.strategy != baseline]
     reference = {run.seed: run.error_shared for run in runs if run.strategy == baseline}
     row, left, width = 0.42, 1.75, 4.6
     height = row * max(1, len(found))
@@ -263,7 +268,8 @@ def _extent(tracks: Sequence[FloatArray], world: World) -> tuple[float, float, f
 def _title(record: Record) -> str:
     options = record.options
     noise = "physical noise" if options.noise is None else f"injected noise ξ = {options.noise.xi:g} rad/m"
-    return f"{record.scenario.name}: {_strategy(options.strategy)}, {options.objective} entropy, {noise}, seed {options.seed}"
+    what = f"{_strategy(options.strategy)}, {_quantity(options.objective)}"
+    return f"{record.scenario.name}: {what}, {noise}, seed {options.seed}"
 
 
 def _subtitle(record: Record) -> str:
@@ -275,4 +281,13 @@ def _subtitle(record: Record) -> str:
 
 
 def _strategy(name: str) -> str:
-    return STRATEGY_NAMES.get(name, name)
+    """In words; an objective of its own in brackets."""
+    if name == HINDSIGHT:
+        return "best in hindsight"
+    strategy, _, objective = name.partition(":")
+    shown = STRATEGY_NAMES.get(strategy, strategy)
+    return f"{shown} ({objective})" if objective else shown
+
+
+def _quantity(objective: str) -> str:
+    return OBJECTIVE_NAMES.get(objective, objective)

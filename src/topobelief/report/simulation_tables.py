@@ -9,7 +9,9 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from topobelief.planning.units import cell
+from topobelief.objectives.objective import Objective
+from topobelief.planning.registry import OBJECTIVES, chosen
+from topobelief.planning.units import cell, shown_unit
 from topobelief.report.tables import quantity_table
 from topobelief.simulation.comparison import StrategySummary
 from topobelief.simulation.metrics import run_metrics
@@ -29,7 +31,7 @@ def leg_line(leg: Leg) -> str:
 
 
 def metrics_table(record: Record) -> Table:
-    """Errors, entropies and times of a run."""
+    """Errors, objective and times of a run."""
     values = run_metrics(record)
     rows = [
         ("goals reached in truth", f"{values['goals_reached']:.0f} of {values['goals']:.0f}"),
@@ -49,11 +51,12 @@ def metrics_table(record: Record) -> Table:
         ("  wheel odometry", "wheel_odometry"),
     ):
         whole, before = values[f"error_{name}"], values[f"error_{name}_before"]
-        rows.append((label, f"{whole:.3f} m on all poses, {before:.3f} m on those before the last leg"))
-    if "predicted_entropy" in values:
-        unit = f"nats ({record.options.objective})"
-        entropies = ", ".join(f"{name} {cell(values[f'{name}_entropy'])}" for name in ("prior", "predicted", "achieved"))
-        rows.append(("entropy of the last leg", f"{entropies} {unit}"))
+        rows.append((label, f"{cell(whole, 'm')} cm on all poses, {cell(before, 'm')} cm on those before the last leg"))
+    if "predicted_value" in values:
+        objective: Objective = chosen(OBJECTIVES, record.options.objective)
+        unit, words = objective.unit, (("prior", "before"), ("predicted", "predicted"), ("achieved", "achieved"))
+        found = ", ".join(f"{word} {cell(values[f'{name}_value'], unit)}" for name, word in words)
+        rows.append((f"{objective.quantity}, last leg", f"{found} {shown_unit(unit)}"))
     driven = values["driven_seconds"]
     for label, name in (("making candidates", "candidates_seconds"), ("deciding", "decision_seconds")):
         share = f", {values[name] / driven:.3%} of the time driven" if driven else ""
@@ -61,18 +64,28 @@ def metrics_table(record: Record) -> Table:
     return quantity_table(f"{record.scenario.name}: {record.outcome}", rows)
 
 
-def comparison_table(found: Sequence[StrategySummary], *, baseline: str) -> Table:
-    """One line per strategy: medians over the seeds, and the share of seeds in which it beat the baseline."""
+def comparison_table(found: Sequence[StrategySummary], *, baseline: str, unit: str) -> Table:
+    """One line per strategy: medians over the seeds, and the share of seeds in which it beat the baseline.
+
+    Parameters
+    ----------
+    found
+    baseline
+        The strategy that gains are told against.
+    unit
+        Of the objective.
+    """
     table = Table(
         box=box.SIMPLE_HEAD,
         padding=(0, 1),
         pad_edge=False,
-        caption=f"medians over seeds; errors in metres, means over redraws; gain: of the error before, against {baseline}; "
-        "before: on the poses that stood before the session",
+        caption=f"medians over seeds; predicted: the objective of the chosen path, {shown_unit(unit)}; errors in centimetres, "
+        f"means over redraws: of the map, the poses that stood before the session, and of all poses; against {baseline}: "
+        "saved, of the map's error on the same seed, and gain, by which its median is lower",
         caption_justify="left",
     )
     table.add_column("strategy", no_wrap=True)
-    for name in ("arrived", "metres", "closures", "entropy", "error before", "error all", "gain", "better", "same"):
+    for name in ("arrived", "metres", "closures", "predicted", "map error", "error of all", "saved", "gain", "better", "same"):
         table.add_column(name, justify="right", no_wrap=True)
     for each in found:
         table.add_row(
@@ -80,9 +93,10 @@ def comparison_table(found: Sequence[StrategySummary], *, baseline: str) -> Tabl
             f"{each.num_arrived}/{each.num_runs}",
             f"{each.planned:.1f}",
             f"{each.num_closures:.0f}",
-            cell(each.entropy),
-            f"{each.error_shared:.3f}",
-            f"{each.error_all:.3f}",
+            cell(each.predicted, unit),
+            f"{100 * each.error_shared:.1f}",
+            f"{100 * each.error_all:.1f}",
+            cell(each.saved, "m"),
             _percent(each.gain),
             _percent(each.share_better),
             _percent(each.share_same),

@@ -16,6 +16,8 @@ import numpy as np
 from matplotlib.colors import LinearSegmentedColormap, to_hex
 from matplotlib.figure import Figure
 
+from topobelief.planning.registry import unit_of
+from topobelief.planning.units import shown_factor, shown_unit
 from topobelief.report import style
 from topobelief.report.canvas import Canvas, Entry, Panel
 from topobelief.study.summary import Share, Spread, Summary
@@ -24,11 +26,12 @@ _LEFT, _RIGHT, _TOP, _BOTTOM = 1.70, 0.25, 1.00, 0.85  # inches, as all lengths 
 _MARGIN, _LEAST_WIDTH = 0.25, 7.2
 _PANEL_WIDTH, _GAP_ACROSS, _GAP_DOWN = 2.60, 0.42, 0.66
 _LINE, _ROW_PADDING = 0.105, 0.10  # of a noise, and around those of a strategy
-_LEAST_LOSS = 0.1  # nats, below which the scale of losses is linear
+_LEAST_LOSS = 0.1  # nats or centimetres, below which the scale of losses is linear
 _LIGHTEST, _DARKEST = "#7DB8DE", "#0B2F5B"
 STRATEGY_NAMES = {
     "optimum": "proven optimum",
     "standard": "standard BSP",
+    "resistance": "effective resistance",
     "spanning_trees": "spanning trees",
     "von_neumann": "von Neumann",
     "von_neumann_approx": "von Neumann, degrees",
@@ -37,7 +40,8 @@ STRATEGY_NAMES = {
 }
 """What figures call the strategies, in the order in which they stand."""
 
-_OBJECTIVES = {"joint": "joint entropy", "map": "map entropy", "per_pose": "entropy per pose"}
+OBJECTIVE_NAMES = {"joint": "joint entropy", "map": "map entropy", "per_pose": "entropy per pose", "error": "map error"}
+"""What figures call the objectives, in the order in which they stand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +75,7 @@ class _Mark:
 
 @dataclass(frozen=True, slots=True)
 class _Question:
-    """The question that a figure answers, and its axis."""
+    """The question that a figure answers, and its axis; "{unit}" in its label is that in which the objective is shown."""
 
     title: str
     subtitle: str
@@ -88,7 +92,7 @@ def draw_choices(found: Sequence[Summary]) -> Figure:
         found,
         _Question(
             "How often the best candidate is chosen",
-            "share of the seeds in which the choice loses at most 1e-6 nats; lines: 95 % intervals",
+            "share of the seeds in which the choice loses at most 1e-6 of the objective; lines: 95 % intervals",
             "best candidate chosen (%)",
             lambda one: _Mark.of_share(one.action_consistent),
             limits=(-3, 103),
@@ -104,8 +108,8 @@ def draw_losses(found: Sequence[Summary]) -> Figure:
         _Question(
             "What a choice loses against the best candidate",
             "dots: medians; thick: quartiles; thin: 10 to 90 % of the seeds; diamonds: means",
-            "loss (nats)",
-            lambda one: _Mark.of_spread(one.loss, with_mean=True),
+            "loss ({unit})",
+            lambda one: _Mark.of_spread(one.loss, factor=shown_factor(unit_of(one.objective)), with_mean=True),
             scale="log from 0",
         ),
     )
@@ -155,7 +159,7 @@ def _drawn(found: Sequence[Summary], question: _Question) -> Figure:
     colours = dict(zip(noises, _shades(len(noises)), strict=True))
     strategies = [name for name in STRATEGY_NAMES if any(one.strategy == name for one in marks)]
     sessions = list(dict.fromkeys((one.world, one.session) for one in found))
-    objectives = [name for name in _OBJECTIVES if any(one.objective == name for one in found)]
+    objectives = [name for name in OBJECTIVE_NAMES if any(one.objective == name for one in found)]
     row = _LINE * len(noises) + _ROW_PADDING
     height = row * max(1, len(strategies))
     width = _LEFT + len(objectives) * (_PANEL_WIDTH + _GAP_ACROSS) - _GAP_ACROSS + _RIGHT
@@ -174,8 +178,9 @@ def _drawn(found: Sequence[Summary], question: _Question) -> Figure:
                     if (one.world, one.session, one.objective) == (world, session, objective):
                         offset = (noises.index(one.xi) - (len(noises) - 1) / 2) * _LINE / row
                         _draw_mark(panel, mark, strategies.index(one.strategy) + offset, colours[one.xi])
-                _finish_axis(panel, list(marks.values()), question, with_label=down == len(sessions) - 1)
-                canvas.text(left, bottom + height + 0.07, f"{session} in {world}, {_OBJECTIVES[objective]}", fontsize=8.5)
+                label = question.axis.format(unit=shown_unit(unit_of(objective))) if down == len(sessions) - 1 else ""
+                _finish_axis(panel, list(marks.values()), question, label)
+                canvas.text(left, bottom + height + 0.07, f"{session} in {world}, {OBJECTIVE_NAMES[objective]}", fontsize=8.5)
         canvas.title(_MARGIN, canvas.height - 0.50, question.title, question.subtitle)
         key = [
             Entry(f"ξ = {xi:g} rad/m", color=shade, marker="o", markersize=3.5, linewidth=2) for xi, shade in colours.items()
@@ -198,9 +203,9 @@ def _draw_mark(panel: Panel, mark: _Mark, y: float, colour: str) -> None:
     panel.line([(mark.middle, y)], color=colour, marker="o", markersize=3.4, linestyle="none", zorder=6)
 
 
-def _finish_axis(panel: Panel, marks: Sequence[_Mark], question: _Question, *, with_label: bool) -> None:
+def _finish_axis(panel: Panel, marks: Sequence[_Mark], question: _Question, label: str) -> None:
     """The same scale on all panels."""
-    panel.value_axis(question.axis if with_label else "")
+    panel.value_axis(label)
     if question.limits is not None:
         panel.axes.set_xlim(*question.limits)
         panel.axes.set_xticks(question.ticks, [f"{tick:g}" for tick in question.ticks])

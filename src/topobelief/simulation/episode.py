@@ -243,17 +243,15 @@ class Episode:
         random_scores = np.eye(len(actions))[drawn]
         question = Question(belief, actions, lengths, random_scores, options.objective)
         choice = choose(options.strategy, question)
-        entropies = question.planner().entropies(actions)
-        deliberation = Deliberation(
-            leg=len(self._legs), prior=belief, paths=found.paths, actions=actions, entropies=entropies, choice=choice
-        )
+        values = question.values()
+        deliberation = Deliberation(leg=len(self._legs), question=question, paths=found.paths, values=values, choice=choice)
         return deliberation, replace(
             leg,
             num_candidates=len(actions),
             chosen=choice.index,
             planned=float(lengths[choice.index]),
-            prior_entropy=achieved_entropy(belief, belief.num_poses, options.objective),
-            predicted_entropy=float(entropies[choice.index]),
+            prior_value=value_after(belief, belief.num_poses, options.objective),
+            predicted_value=float(values[choice.index]),
             candidates_seconds=candidates_seconds,
             decision_seconds=choice.seconds,
         )
@@ -282,7 +280,7 @@ class Episode:
             last_pose=self._slam.num_poses - 1,
             distance=distance,
             num_closures=self._slam.num_closures - closures,
-            achieved_entropy=achieved_entropy(self._slam.belief, leg.first_pose + 1, objective) if leg.goal else float("nan"),
+            achieved_value=value_after(self._slam.belief, leg.first_pose + 1, objective) if leg.goal else float("nan"),
             driven_seconds=self._robot.time - begin,
             contacts=self._robot.contacts - contacts,
         )
@@ -355,8 +353,8 @@ def _shown(pose: FloatArray) -> str:
     return f"({pose[0]:.2f}, {pose[1]:.2f})"
 
 
-def achieved_entropy(graph: PoseGraph, num_existing: int, objective: str) -> float:
-    """The objective of a graph whose first `num_existing` poses stood before the leg, nats."""
+def value_after(graph: PoseGraph, num_existing: int, objective: str) -> float:
+    """The objective of a graph whose first `num_existing` poses stood before the leg, in its unit."""
     among = (graph.edges < num_existing).all(axis=1)
     prior = PoseGraph(graph.poses[:num_existing], graph.edges[among], None, graph.information[among])
     rest = Action(graph.poses[num_existing:], graph.edges[~among], graph.information[~among])

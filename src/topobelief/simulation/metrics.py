@@ -118,7 +118,9 @@ def trajectory_errors(
 
 
 def run_metrics(record: Record) -> dict[str, float]:
-    """Named numbers of a run; seconds, metres and nats. `_before` is on the poses that existed before its last leg.
+    """Named numbers of a run; seconds, metres, nats, and `_value`s in the unit of the objective.
+
+    `_before` is on the poses that existed before the last leg; the values are those of that leg.
 
     `goal_distance` and `believed_goal_distance` are the largest over the last legs to each goal, see `record.Leg`.
     """
@@ -147,7 +149,7 @@ def run_metrics(record: Record) -> dict[str, float]:
         values |= {f"error_{name}{suffix}": value for name, value in asdict(errors).items()}
     values["joint_entropy"] = joint_entropy(record.graph)
     if decided:
-        values |= {f"{name}_entropy": getattr(decided[-1], f"{name}_entropy") for name in ("prior", "predicted", "achieved")}
+        values |= {f"{name}_value": getattr(decided[-1], f"{name}_value") for name in ("prior", "predicted", "achieved")}
     return values
 
 

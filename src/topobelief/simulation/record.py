@@ -5,17 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from topobelief.arrays import FloatArray
-from topobelief.candidates.polyline import path_length
-from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.simulation.noise import InjectedNoise
 from topobelief.simulation.occupancy import OccupancyMap
 from topobelief.simulation.scan import Scan
 from topobelief.simulation.scenario import Scenario
 from topobelief.strategies.choice import Choice
+from topobelief.strategies.question import Question
 
 ARRIVED, MISSED, CONTACT, INTERRUPTED = "arrived", "missed", "contact", "interrupted"
 ARRIVAL_TOLERANCE = 0.3
@@ -29,7 +26,8 @@ class RunOptions:
     Attributes
     ----------
     strategy, objective
-        How paths are chosen (`topobelief.strategies.registry`), and what the planner minimises.
+        How paths are chosen (`topobelief.strategies.registry`), and what the planner minimises; by default the expected error
+        of the map, by its signature.
     seed
         The same seed gives the same run on one machine.
     noise : InjectedNoise or None
@@ -38,8 +36,8 @@ class RunOptions:
         Start with an empty map instead of the floor plan.
     """
 
-    strategy: str = "spanning_trees"
-    objective: str = "joint"
+    strategy: str = "resistance"
+    objective: str = "error"
     seed: int = 0
     noise: InjectedNoise | None = None
     unknown: bool = False
@@ -64,8 +62,9 @@ class Leg:
         Length of the chosen path and of what was driven, metres.
     num_closures
         Loop closures that the front end accepted on the way.
-    prior_entropy, predicted_entropy, achieved_entropy
-        The objective before, as the chosen action predicts it, and of what came of it; nan where nothing was decided.
+    prior_value, predicted_value, achieved_value
+        The objective, in its unit: before, as the chosen action predicts it, and of what came of it; nan where nothing was
+        decided.
     candidates_seconds, decision_seconds
         Wall time of making the candidates and of choosing one.
     driven_seconds
@@ -86,9 +85,9 @@ class Leg:
     planned: float = float("nan")
     distance: float = 0.0
     num_closures: int = 0
-    prior_entropy: float = float("nan")
-    predicted_entropy: float = float("nan")
-    achieved_entropy: float = float("nan")
+    prior_value: float = float("nan")
+    predicted_value: float = float("nan")
+    achieved_value: float = float("nan")
     candidates_seconds: float = 0.0
     decision_seconds: float = 0.0
     driven_seconds: float = 0.0
@@ -115,26 +114,20 @@ class Deliberation:
     ----------
     leg
         Index of the leg that it led to.
-    prior : PoseGraph
-        The belief that was decided on.
-    paths, actions
-        K candidates.
-    entropies : shape (K,)
-        Their exact objective, whether or not the strategy looked at it.
+    question : Question
+        The belief that was decided on, K candidates, and the objective.
+    paths
+        Of the candidates.
+    values : shape (K,)
+        Their exact objective, in its unit, whether or not the strategy looked at it.
     choice
     """
 
     leg: int
-    prior: PoseGraph
+    question: Question
     paths: Sequence[FloatArray]
-    actions: Sequence[Action]
-    entropies: FloatArray
+    values: FloatArray
     choice: Choice
-
-    @property
-    def lengths(self) -> FloatArray:
-        """Of the paths, metres, shape (K,)."""
-        return np.array([path_length(path) for path in self.paths])
 
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)

@@ -30,6 +30,7 @@ from topobelief.errors import FileError
 from topobelief.io.files import StrPath, read_text
 from topobelief.io.g2o import write_g2o
 from topobelief.io.json_values import without_nan
+from topobelief.planning.registry import unit_of
 from topobelief.simulation.metrics import chained, run_metrics
 from topobelief.simulation.noise import InjectedNoise
 from topobelief.simulation.record import Deliberation, History, KeyPoses, Leg, Record, RunOptions
@@ -70,6 +71,7 @@ def run_document(record: Record) -> dict[str, object]:
             **asdict(options),
             "noise": None if options.noise is None else [options.noise.sigma_p, options.noise.sigma_theta],
         },
+        "unit": unit_of(options.objective),
         "outcome": record.outcome,
         "metrics": {name: without_nan(value) for name, value in run_metrics(record).items()},
         "legs": [{name: without_nan(value) for name, value in asdict(leg).items()} for leg in record.legs],
@@ -161,20 +163,23 @@ def _key_poses(record: Record) -> str:
 def _deliberation(each: Deliberation) -> dict[str, object]:
     """A decision as JSON; `decision` is what `Decision.from_dict` reads, None where the strategy makes none."""
     decision = each.choice.decision
-    candidates = zip(each.paths, each.lengths.tolist(), each.actions, each.entropies.tolist(), strict=True)
+    question = each.question
+    candidates = zip(each.paths, question.lengths.tolist(), question.actions, each.values.tolist(), strict=True)
     return {
-        "num_poses": each.prior.num_poses,
+        "num_poses": question.graph.num_poses,
+        "objective": question.objective,
+        "unit": question.unit,
         "chosen": each.choice.index,
         "decision": None if decision is None else decision.to_dict(),
         "candidates": [
             {
                 "length": length,
-                "entropy": without_nan(entropy),
+                "value": without_nan(value),
                 "num_new_poses": action.num_new_poses,
-                "num_closures": len(action.edges) - action.num_new_poses,
+                "num_closures": action.num_closures,
                 "waypoints": path.tolist(),
             }
-            for path, length, action, entropy in candidates
+            for path, length, action, value in candidates
         ],
     }
 

@@ -56,6 +56,9 @@ class Scenario:
         own front end, with a probability that is learned from its graph. The goal says how many paths; the run and SLAM give
         the rest.
     robot, lidar
+    objective, strategy
+        What the robot minimises, and how it chooses, unless a run says otherwise. Without a strategy it ranks by the signature
+        that goes with the objective.
     """
 
     name: str
@@ -66,6 +69,8 @@ class Scenario:
     rule: CandidateRule = field(default_factory=CandidateRule)
     robot: RobotSettings = field(default_factory=RobotSettings)
     lidar: LidarSettings = field(default_factory=LidarSettings)
+    objective: str = "error"
+    strategy: str | None = None
 
     def __post_init__(self) -> None:
         if not self.goals:

@@ -6,6 +6,10 @@
     goals: [[26, 8], [25, -2.95]]
     candidates: [9, 20]           # paths to compare, one number or one a goal
     max_detour: 1.3               # none for no limit
+    objective: error              # what the robot minimises
+    strategy: resistance          # how it chooses; default: the signature that goes with the objective
+    closures: learned             # or paper
+    as_paper: false               # true: joint, spanning_trees and paper, unless the three above say otherwise
     robot_radius: 0.35            # metres that paths keep from walls; default: the chassis and 0.1 m
     lidar: {max_range: 10, range_noise: 0.01}
     robot: {radius: 0.25, wheel_slip: 0.02}
@@ -18,7 +22,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TypeVar, cast, get_args
+from typing import Literal, TypeVar, cast, get_args
 
 from topobelief.candidates.closures import ClosureModel
 from topobelief.candidates.propose import CandidateRule
@@ -26,11 +30,19 @@ from topobelief.errors import InvalidInputError
 from topobelief.io.floor_plan import read_world
 from topobelief.io.ros_map import Unknown
 from topobelief.io.yaml_fields import Field, read_fields
+from topobelief.planning.registry import OBJECTIVES
 from topobelief.simulation.lidar import LidarSettings
 from topobelief.simulation.robot_settings import RobotSettings
 from topobelief.simulation.scenario import SAFE_MARGIN, SCENARIO_NAMES, Goal, Scenario, named_scenario
+from topobelief.strategies.registry import checked_strategy
 
 _Settings = TypeVar("_Settings", RobotSettings, LidarSettings)
+Closures = Literal["learned", "paper"]
+"""Loop closures predicted as the robot's own front end makes them, with a probability learned from its graph; or as the paper
+predicts them, all poses within 2 m and 1 rad, through walls, with certainty."""
+
+
+_DECISION_KEYS = ("objective", "strategy", "closures", "as_paper")
 
 
 def scenario_of(name: str) -> Scenario:
@@ -65,6 +77,20 @@ def with_detour(scenario: Scenario, max_detour: float | None) -> Scenario:
     return dataclasses.replace(scenario, rule=dataclasses.replace(scenario.rule, max_detour=max_detour or None))
 
 
+def with_closures(scenario: Scenario, closures: Closures | None) -> Scenario:
+    """The scenario with other predicted closures; None for its own."""
+    if closures is None:
+        return scenario
+    paper = closures == "paper"
+    model = ClosureModel.paper() if paper else None
+    return dataclasses.replace(scenario, rule=dataclasses.replace(scenario.rule, closures=model, line_of_sight=not paper))
+
+
+def as_in_paper(scenario: Scenario) -> Scenario:
+    """The scenario decided as in the paper: joint entropy, ranked by spanning trees, with its rule of closures."""
+    return dataclasses.replace(with_closures(scenario, "paper"), objective="joint", strategy="spanning_trees")
+
+
 def read_scenario(path: Path) -> Scenario:
     """The scenario of a YAML file, named as the file is.
 
@@ -76,7 +102,7 @@ def read_scenario(path: Path) -> Scenario:
     top = read_fields(path)
     keys = top.mapping(
         required=("map", "start", "goals"),
-        optional=("unknown", "candidates", "max_detour", "robot_radius", "closures", "lidar", "robot"),
+        optional=("unknown", "candidates", "max_detour", "robot_radius", *_DECISION_KEYS, "lidar", "robot"),
     )
     map_file = path.parent / keys["map"].text(expected="the path of a map (.yaml or .csv)")
     if not map_file.is_file():
@@ -88,7 +114,7 @@ def read_scenario(path: Path) -> Scenario:
     rule = _rule(keys, chassis=robot.radius)
     lidar = _settings(keys.get("lidar"), LidarSettings())
     try:
-        return Scenario(
+        scenario = Scenario(
             name=path.stem,
             world=read_world(map_file, unknown=unknown),
             start=(start[0], start[1], start[2] if len(start) == 3 else 0.0),
@@ -99,6 +125,20 @@ def read_scenario(path: Path) -> Scenario:
         )
     except InvalidInputError as error:
         top.refuse("a start and goals where the robot fits", str(error))
+    return _decided(scenario, keys)
+
+
+def _decided(scenario: Scenario, keys: Mapping[str, Field]) -> Scenario:
+    """The scenario with the decisions that a file asks for."""
+    if "as_paper" in keys and keys["as_paper"].flag():
+        scenario = as_in_paper(scenario)
+    if "closures" in keys:
+        scenario = with_closures(scenario, cast("Closures", keys["closures"].choice(get_args(Closures))))
+    if "objective" in keys:
+        scenario = dataclasses.replace(scenario, objective=keys["objective"].choice(OBJECTIVES))
+    if "strategy" in keys:
+        scenario = dataclasses.replace(scenario, strategy=keys["strategy"].checked(checked_strategy))
+    return scenario
 
 
 def _goals(field: Field, candidates: Field | None) -> tuple[Goal, ...]:
@@ -128,8 +168,6 @@ def _rule(keys: Mapping[str, Field], *, chassis: float) -> CandidateRule:
                 f"{radius:g}; raise it, or make the chassis smaller by robot: {{radius: ...}}",
             )
         rule = dataclasses.replace(rule, robot_radius=radius)
-    if "closures" in keys and keys["closures"].choice(("learned", "paper")) == "paper":
-        rule = dataclasses.replace(rule, closures=ClosureModel.paper(), line_of_sight=False)
     return rule
 
 

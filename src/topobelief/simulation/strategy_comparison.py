@@ -13,11 +13,11 @@ from topobelief.runs.attempt import Executor
 from topobelief.runs.journal import Journal
 from topobelief.runs.lock import alone
 from topobelief.runs.run import OnProgress, UnfinishedRunError, run_tasks
-from topobelief.simulation.comparison import ComparedRun, compared_records, compared_run
+from topobelief.simulation.comparison import ComparedRun, StrategySummary, compared_runs, summarised
 from topobelief.simulation.noise import InjectedNoise
 from topobelief.simulation.record import RunOptions
 from topobelief.simulation.scenario import Scenario
-from topobelief.simulation.scenario_file import scenario_of, with_detour
+from topobelief.simulation.scenario_file import Closures, scenario_of, with_closures, with_detour
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,10 +28,10 @@ class ComparisonTask:
     ----------
     scenario
         A name, or the path of a YAML file.
-    max_detour
-        See `scenario_file.with_detour`.
+    max_detour, closures
+        See `scenario_file.with_detour` and `with_closures`.
     strategies
-        The first is the baseline.
+        As `comparison.compared_strategy` takes them; the first is the baseline.
     options
         Of all runs; the strategy and the seed are replaced, and the noise, which must be injected, is redrawn.
     num_redraws
@@ -42,6 +42,7 @@ class ComparisonTask:
     strategies: tuple[str, ...]
     options: RunOptions
     num_redraws: int
+    closures: Closures | None = None
 
     def __post_init__(self) -> None:
         _ = self.noise
@@ -58,6 +59,11 @@ class ComparisonTask:
         if self.options.noise is None:
             raise InvalidInputError("expected injected noise to redraw, got physical noise, of which there is one draw a run")
         return self.options.noise
+
+    @property
+    def place(self) -> Scenario:
+        """The scenario with what the comparison changes in it."""
+        return with_closures(with_detour(scenario_of(self.scenario), self.max_detour), self.closures)
 
     def described(self) -> dict[str, object]:
         """For JSON, and to tell whether two tasks are the same."""
@@ -86,7 +92,7 @@ class Comparison:
     ----------
     task
     runs
-        By seed, then in the order of the strategies.
+        By seed, then in the order of the strategies, then those of the candidates that only hindsight asked for.
     failed
         Why seeds failed, by seed; they have no runs.
     num_seeds_now
@@ -98,13 +104,18 @@ class Comparison:
     failed: dict[int, str]
     num_seeds_now: int
 
+    @property
+    def summaries(self) -> list[StrategySummary]:
+        """One line for each strategy that was asked for."""
+        asked = [run for run in self.runs if run.strategy in self.task.strategies]
+        return summarised(asked, baseline=self.task.strategies[0])
+
 
 def play(task: SeedTask) -> list[ComparedRun]:
     """All strategies on one seed."""
     comparison = task.comparison
-    scenario = with_detour(scenario_of(comparison.scenario), comparison.max_detour)
-    records = compared_records(scenario, replace(comparison.options, seed=task.seed), comparison.strategies)
-    return [compared_run(record, comparison.noise, num_redraws=comparison.num_redraws) for record in records]
+    options = replace(comparison.options, seed=task.seed)
+    return compared_runs(comparison.place, options, comparison.strategies, comparison.noise, num_redraws=comparison.num_redraws)
 
 
 def compare(
@@ -138,8 +149,7 @@ def compare(
     UnfinishedRunError
         Where every seed failed.
     """
-    scenario = with_detour(scenario_of(task.scenario), task.max_detour)
-    settings = {**task.described(), "content": _digest(scenario), "topobelief": version("topobelief")}
+    settings = {**task.described(), "content": _digest(task.place), "topobelief": version("topobelief")}
     tasks = [SeedTask(task, seed) for seed in range(num_seeds)]
     with alone(folder):
         journal: Journal[SeedTask, list[ComparedRun]] = Journal(folder / "journal.jsonl", settings, json_rows)

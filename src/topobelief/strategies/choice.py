@@ -24,11 +24,11 @@ class Reasons:
     lower, upper : float or None
         Bounds of the objective of the chosen candidate, where the strategy computes any.
     error_bound : float or None
-        No candidate is better than the chosen one by more than this, nats.
+        No candidate is better than the chosen one by more than this, in the objective's unit.
     num_survivors : int or None
         Candidates that the bounds do not rule out.
     num_evaluations : int
-        Exact entropies computed.
+        Exact values computed.
     proven_optimal : bool
     """
 
@@ -66,7 +66,7 @@ class Choice:
         Of the chosen candidate.
     seconds : float
         Wall time from the question to the index. It includes building the planner (factoring the prior), signatures, and the
-        bounds and exact entropies without which the strategy cannot name an index. It excludes what is computed afterwards to
+        bounds and exact values without which the strategy cannot name an index. It excludes what is computed afterwards to
         say how good the choice is (the bounds behind a ranking by signature), finding the candidates, and compiling kernels.
     reasons : Reasons
     """

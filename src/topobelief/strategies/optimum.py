@@ -7,6 +7,6 @@ from topobelief.strategies.question import Question
 
 
 def optimum(name: str, question: Question) -> Answer:
-    """The least objective, searched for along the ranking by spanning trees."""
+    """The least objective, searched for along the ranking by the signature that goes with it."""
     decision = question.planner().decide(question.actions, proof="optimal")
     return decision.best, lambda: Reasons.of(decision)

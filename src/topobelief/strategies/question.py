@@ -11,6 +11,7 @@ from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.optional import has_kernels
 from topobelief.planning.planner import Planner
+from topobelief.planning.registry import default_signature, unit_of
 
 
 def installed_bounds() -> str:
@@ -44,12 +45,27 @@ class Question:
     bounds: str = field(default_factory=installed_bounds)
     determinant: Determinant = "cholesky"
 
-    def planner(self, signature: str = "spanning_trees") -> Planner:
-        """For this question; dense spectra are allowed, since the caller named the strategy."""
+    @property
+    def unit(self) -> str:
+        """Of the objective."""
+        return unit_of(self.objective)
+
+    def values(self) -> FloatArray:
+        """The exact objective of every action, shape (K,), in its unit."""
+        return self.planner().entropies(self.actions)
+
+    def planner(self, signature: str | None = None) -> Planner:
+        """For this question; dense spectra are allowed, since the caller named the strategy.
+
+        Parameters
+        ----------
+        signature
+            Default: the one that goes with the objective.
+        """
         return Planner(
             self.graph,
             objective=self.objective,
-            signature=signature,
+            signature=signature or default_signature(self.objective),
             bounds=self.bounds,
             determinant=self.determinant,
             allow_dense_spectrum=True,

@@ -10,7 +10,7 @@ from topobelief.strategies.question import Question
 
 def standard(name: str, question: Question) -> Answer:
     """The least objective of all."""
-    values = question.planner().entropies(question.actions)
+    values = question.values()
     best = int(np.argmin(values))
     least = float(values[best])
     return best, lambda: Reasons(

@@ -29,7 +29,7 @@ COLUMNS: dict[str, ColumnType] = {
     "length": "number",  # m, of the chosen path, as the next two
     "num_new_poses": "whole",
     "num_closures": "whole",
-    "value": "number",  # objective of the chosen one, nats, as all down to error_bound
+    "value": "number",  # objective of the chosen one, in nats or (error) metres, as all down to error_bound
     "best_value": "number",
     "spread": "number",  # largest less least value
     "loss": "number",  # value - best_value: epsilon of Definition 1
@@ -42,7 +42,7 @@ COLUMNS: dict[str, ColumnType] = {
     "num_evaluations": "whole",  # exact ones, before the answer
     "proven_optimal": "flag",
     "order_consistent": "flag",  # gamma up to 1e-6
-    "gamma": "number",  # of Definition 1, nats
+    "gamma": "number",  # of Definition 1, as value
     "spearman": "number",
     "kendall": "number",
     "candidate_lengths": "numbers",  # m

@@ -24,7 +24,7 @@ from topobelief.strategies.question import Question
 from topobelief.study.tasks import Task
 
 TIE = 1e-6
-"""Nats: a choice that loses no more than this is as good as the best, and an order broken by no more is kept."""
+"""A choice that loses no more than this, in the unit of the objective, is as good as the best; so is an order."""
 
 Row = dict[str, object]
 """Values by the names of `rows.COLUMNS`."""
@@ -46,7 +46,7 @@ def play(task: Task) -> Row:
     Returns
     -------
     Row
-        All columns but those that say how the task fared. Objectives and bounds are in nats.
+        All columns but those that say how the task fared. Objectives and bounds are in the unit of the objective.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def play(task: Task) -> Row:
     choice = choose(task.strategy, question)
     reasons = choice.reasons
     begin = time.perf_counter()
-    values = question.planner().entropies(actions)
+    values = question.values()
     spread = float(np.ptp(values))
     quality = None if reasons.scores is None else decision_quality(values, reasons.scores)
     scored = time.perf_counter() - begin

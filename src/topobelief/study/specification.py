@@ -6,7 +6,7 @@ Every combination is a task. A session runs in all worlds unless it names its ow
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, TypeVar, cast, get_args
@@ -26,7 +26,7 @@ from topobelief.io.floor_plan import read_world
 from topobelief.io.formats import read_pose_graph
 from topobelief.io.ros_map import Unknown
 from topobelief.io.yaml_fields import Field, read_fields
-from topobelief.planning.registry import AUTO, BOUNDS, OBJECTIVES
+from topobelief.planning.registry import AUTO, BOUNDS, OBJECTIVES, has_bounds
 from topobelief.strategies.registry import STRATEGIES
 from topobelief.world import World
 
@@ -152,6 +152,7 @@ def read_specification(path: StrPath) -> Specification:
     objectives = ("joint",)
     if "objectives" in fields:
         objectives = _several(fields["objectives"], lambda item: item.choice(OBJECTIVES))
+    rule = _rule(fields["rule"], objectives) if "rule" in fields else Rule()
     return Specification(
         worlds=worlds,
         sessions=sessions,
@@ -159,7 +160,7 @@ def read_specification(path: StrPath) -> Specification:
         strategies=_several(fields["strategies"], lambda item: item.choice(STRATEGIES)),
         objectives=objectives,
         seeds=_seeds(fields["seeds"]),
-        rule=_rule(fields["rule"]) if "rule" in fields else Rule(),
+        rule=rule,
     )
 
 
@@ -247,7 +248,9 @@ def _seeds(field: Field) -> tuple[int, ...]:
     return tuple(range(field.whole(at_least=1)))
 
 
-def _rule(field: Field) -> Rule:
+def _rule(field: Field, objectives: Collection[str]) -> Rule:
+    """How candidates are found, with bounds that every objective has."""
+    families = [name for name in (*BOUNDS, AUTO) if all(has_bounds(objective, name) for objective in objectives)]
     readers: dict[str, Callable[[Field], object]] = {
         "num_vertices": lambda item: item.whole(at_least=2),
         "robot_radius": lambda item: item.number(above=0),
@@ -259,7 +262,7 @@ def _rule(field: Field) -> Rule:
         "closure_angle": lambda item: item.number(above=0, at_most=math.pi),
         "min_index_gap": lambda item: item.whole(at_least=2),
         "line_of_sight": Field.flag,
-        "bounds": lambda item: item.choice((*BOUNDS, AUTO)),
+        "bounds": lambda item: item.choice(families),
         "determinant": lambda item: item.choice(get_args(Determinant)),
     }
     keys = field.mapping(optional=readers)

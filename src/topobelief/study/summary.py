@@ -71,7 +71,7 @@ class Summary:
     order_consistent : Share
         Rankings that keep the order of all candidates.
     loss : Spread
-        Nats.
+        In the unit of the objective: metres for "error", else nats.
     spearman : Spread
         Rank correlation of the objective with minus the score.
     evaluations : Spread
