@@ -60,7 +60,7 @@ def reproduce(
     reporter.say(claims_table(found.claims))
     holding = sum(claim.holds for claim in found.claims)
     reporter.say(
-        f"{holding} of {len(found.claims)} lines hold as the paper states them, over {plan.num_seeds} seeds.",
+        f"{holding} of {len(found.claims)} lines hold as written, over {plan.num_seeds} seeds.",
         f"Report: {folder / 'report.html'}; figures and numbers: {folder / 'figures'}, {folder / 'tables'}",
         f"Took {reporter.time_taken()}",
     )
