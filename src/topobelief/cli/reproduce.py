@@ -29,7 +29,7 @@ def reproduce(
 ) -> None:
     """Run the experiments of the paper, say for each claim whether it holds, and write one report.
 
-    Killed at any moment, the same command continues where it stopped. Under two minutes with --quick, under twenty without, on
+    Killed at any moment, the same command continues where it stopped. Some two minutes with --quick, about half an hour without, on
     two cores with nothing else to do. Needs the extras fast, gtsam and page.
     """
     from topobelief.cli.console import Reporter
