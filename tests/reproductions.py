@@ -20,6 +20,9 @@ SMALLEST = ReproductionPlan(
     num_random_graphs=2,
     largest_spectrum=30,
     num_length_paths=4,
+    error_maps=("S2",),
+    num_error_seeds=1,
+    num_error_paths=4,
 )
 
 

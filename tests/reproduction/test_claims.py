@@ -50,7 +50,7 @@ GRAPHS = [graph(n, density, shift=float(n > 10)) for n in (10, 20) for density i
 
 
 def verdicts(actions: list[ActionRow] = ACTIONS, standard: float = 0.1) -> dict[tuple[str, str], bool]:
-    return {(claim.claim, claim.scope): claim.holds for claim in claims(actions, times(standard), GRAPHS)}
+    return {(claim.claim, claim.scope): claim.holds for claim in claims(actions, times(standard), GRAPHS, [])}
 
 
 def test_rows_that_behave_as_claimed_pass() -> None:

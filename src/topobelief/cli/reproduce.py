@@ -29,7 +29,7 @@ def reproduce(
 ) -> None:
     """Run the experiments of the paper, say for each claim whether it holds, and write one report.
 
-    Killed at any moment, the same command continues where it stopped. Under two minutes with --quick, under twenty without, on
+    Killed at any moment, the same command continues where it stopped. Some two minutes with --quick, about half an hour without, on
     two cores with nothing else to do. Needs the extras fast, gtsam and page.
     """
     from topobelief.cli.console import Reporter
@@ -60,7 +60,7 @@ def reproduce(
     reporter.say(claims_table(found.claims))
     holding = sum(claim.holds for claim in found.claims)
     reporter.say(
-        f"{holding} of {len(found.claims)} lines hold as the paper states them, over {plan.num_seeds} seeds.",
+        f"{holding} of {len(found.claims)} lines hold as written, over {plan.num_seeds} seeds.",
         f"Report: {folder / 'report.html'}; figures and numbers: {folder / 'figures'}, {folder / 'tables'}",
         f"Took {reporter.time_taken()}",
     )

@@ -1,4 +1,5 @@
-"""What `topobelief reproduce` leaves behind besides its tables: figures as PNG and PDF, claims.md, report.html."""
+"""What `topobelief reproduce` leaves behind besides its tables: figures as PNG and PDF, claims.md,
+entropy_or_error.md, report.html."""
 
 from __future__ import annotations
 
@@ -9,6 +10,7 @@ from pathlib import Path
 from topobelief.cli.plan_files import write_together
 from topobelief.io.files import write_text
 from topobelief.report.canvas import save_figure
+from topobelief.report.reproduction.choice_table import choices_markdown
 from topobelief.report.reproduction.claims_table import claims_markdown
 from topobelief.report.reproduction.figures import figures_of
 from topobelief.report.reproduction.page import command, page
@@ -42,6 +44,7 @@ def write(folder: Path, found: Reproduction, tell: Callable[[str], None]) -> Non
         write_together(folder / "figures", {name: lambda path, drawn=drawn: save_figure(drawn, path) for name in names})
         pictures[figure.name] = (folder / "figures" / names[0]).read_bytes()
     write_text(folder / "claims.md", claims_markdown(found.claims))
+    write_text(folder / "entropy_or_error.md", choices_markdown(found.choices))
     tell("the page")
     tables = sorted(path.stem for path in (folder / "tables").glob("*.csv"))
     write_text(folder / "report.html", page(found, figures, pictures, tables))

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from topobelief.errors import InvalidInputError
+from topobelief.reproduction.entropy_or_error import MAPS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,9 +27,11 @@ class ReproductionPlan:
     sizes, degree_increases, num_random_graphs
         Random graphs: poses, increases of the average degree, and graphs for each pair.
     largest_spectrum
-        Poses above which the exact von Neumann entropy is left out.
+        Poses above which the exact von Neumann entropy is left out, and real graphs in "entropy or error".
     num_length_paths
         Candidates in the figure of path lengths.
+    error_maps, num_error_seeds, num_real_error_seeds, num_error_paths
+        Entropy or error: the maps, seeds on each and on each real pose graph, and candidates.
     files, num_real_actions
         Real pose graphs, and candidates on each.
     quick
@@ -45,6 +48,10 @@ class ReproductionPlan:
     num_random_graphs: int = 10
     largest_spectrum: int = 2000
     num_length_paths: int = 60
+    error_maps: tuple[str, ...] = MAPS
+    num_error_seeds: int = 30
+    num_real_error_seeds: int = 3
+    num_error_paths: int = 20
     files: tuple[Path, ...] = ()
     num_real_actions: int = 50
     quick: bool = False
@@ -62,6 +69,9 @@ class ReproductionPlan:
             num_random_graphs=3,
             largest_spectrum=800,
             num_length_paths=40,
+            num_error_seeds=2,
+            num_real_error_seeds=1,
+            num_error_paths=10,
             files=files,
             num_real_actions=20,
             quick=True,
@@ -76,6 +86,9 @@ class ReproductionPlan:
             ("repetitions", self.repetitions, 1),
             ("num_random_graphs", self.num_random_graphs, 2),
             ("num_length_paths", self.num_length_paths, 2),
+            ("num_error_seeds", self.num_error_seeds, 1),
+            ("num_real_error_seeds", self.num_real_error_seeds, 1),
+            ("num_error_paths", self.num_error_paths, 2),
             ("num_real_actions", self.num_real_actions, 2),
             *(("sizes", size, 10) for size in self.sizes),
         ):

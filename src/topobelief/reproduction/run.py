@@ -17,6 +17,7 @@ from topobelief.io.row_files import json_rows, rows_of_json, write_rows
 from topobelief.reproduction.anytime import AnytimeRow, anytime_rows
 from topobelief.reproduction.bounds_quality import BoundsRow, bounds_rows
 from topobelief.reproduction.claims import Claim, claims
+from topobelief.reproduction.entropy_or_error import ChoiceRow, ChoiceSummary, choice_rows, summaries
 from topobelief.reproduction.path_length import LengthRow, length_rows
 from topobelief.reproduction.plan import ReproductionPlan
 from topobelief.reproduction.planning_sessions import (
@@ -80,9 +81,9 @@ class Reproduction:
         Processor, cores, system, versions.
     seconds
         Spent on measuring, over all runs.
-    actions, bounds, times, random_graphs, lengths, real_actions, real_bounds
+    actions, bounds, times, random_graphs, lengths, real_actions, real_bounds, choices
         Rows of the experiments.
-    anytime, claims
+    anytime, choice_summaries, claims
         What follows from them.
     """
 
@@ -96,12 +97,15 @@ class Reproduction:
     lengths: list[LengthRow]
     real_actions: list[RealActionRow]
     real_bounds: list[BoundsRow]
+    choices: list[ChoiceRow]
     anytime: list[AnytimeRow] = field(init=False)
+    choice_summaries: list[ChoiceSummary] = field(init=False)
     claims: list[Claim] = field(init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "anytime", anytime_rows(self.actions, self.real_actions))
-        object.__setattr__(self, "claims", claims(self.actions, self.times, self.random_graphs))
+        object.__setattr__(self, "choice_summaries", summaries(self.choices))
+        object.__setattr__(self, "claims", claims(self.actions, self.times, self.random_graphs, self.choices))
 
 
 def experiments(plan: ReproductionPlan) -> tuple[Experiment[Any], ...]:
@@ -109,6 +113,10 @@ def experiments(plan: ReproductionPlan) -> tuple[Experiment[Any], ...]:
     seeds = range(plan.seed, plan.seed + plan.num_seeds)
     timed, bounded = seeds[: plan.num_timed_seeds], seeds[: plan.num_bounds_seeds]
     cases: list[tuple[int, SessionName, float]] = [(seed, name, xi) for seed in seeds for name in SESSIONS for xi in NOISES]
+    decided: list[tuple[str | Path, int]] = [
+        *((place, plan.seed + i) for i in range(plan.num_error_seeds) for place in plan.error_maps),
+        *((path, plan.seed + i) for i in range(plan.num_real_error_seeds) for path in plan.files),
+    ]
     random = [(n, dd, i) for n in plan.sizes for dd in plan.degree_increases for i in range(plan.num_random_graphs)]
     return (
         Experiment(
@@ -169,6 +177,16 @@ def experiments(plan: ReproductionPlan) -> tuple[Experiment[Any], ...]:
             BoundsRow,
             {path.stem: lambda path=path: real_bounds_rows(path, plan.num_real_actions, plan.seed) for path in plan.files},
         ),
+        Experiment(
+            "entropy_or_error",
+            ChoiceRow,
+            {
+                f"{place.stem if isinstance(place, Path) else place}-seed{seed}": lambda place=place, seed=seed: choice_rows(
+                    place, seed, plan.num_error_paths, largest=plan.largest_spectrum
+                )
+                for place, seed in decided
+            },
+        ),
     )
 
 
@@ -226,8 +244,10 @@ def reproduce(
             lengths=tables["path_length"],
             real_actions=tables["real_graphs"],
             real_bounds=tables["real_bounds"],
+            choices=tables["entropy_or_error"],
         )
         write_rows(folder / "tables" / "anytime.csv", AnytimeRow, found.anytime)
+        write_rows(folder / "tables" / "entropy_or_error_summary.csv", ChoiceSummary, found.choice_summaries)
         write_rows(folder / "tables" / "claims.csv", Claim, found.claims)
     return found
 

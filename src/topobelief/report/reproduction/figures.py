@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
+from topobelief.report.reproduction.choice_figure import draw_choices
 from topobelief.report.reproduction.entropy_figures import draw_bounds, draw_signatures
 from topobelief.report.reproduction.length_figure import draw_lengths
 from topobelief.report.reproduction.quality_figures import draw_anytime, draw_bounds_quality, draw_real_graphs
@@ -68,6 +69,11 @@ def figures_of(found: Reproduction) -> list[NamedFigure]:
             lambda: draw_bounds_quality(found.bounds),
         ),
         NamedFigure("anytime", "The best action so far against exact evaluations.", lambda: draw_anytime(found.anytime)),
+        NamedFigure(
+            "entropy_or_error",
+            "What each way to choose loses of the map's expected error, and how it ranks the candidates by it.",
+            lambda: draw_choices(found.choices),
+        ),
     ]
     if found.real_actions:
         figures.append(

@@ -22,6 +22,7 @@ from topobelief.arrays import FloatArray
 from topobelief.candidates.polyline import subdivided
 from topobelief.io.json_values import without_nan
 from topobelief.optional import load
+from topobelief.report.reproduction.choice_table import choice_cells
 from topobelief.report.reproduction.figures import NamedFigure
 from topobelief.reproduction.claims import Claim
 from topobelief.reproduction.planning_sessions import NOISES, SESSIONS, PlanningSession, cases, office_session
@@ -61,6 +62,11 @@ def page(found: Reproduction, figures: Sequence[NamedFigure], pictures: Mapping[
             "read off the paper's plots and take no part in the verdict."
         ),
         claims="".join(_claim_row(claim) for claim in found.claims),
+        choices_lead=escape(
+            f"{sum(row.chooser == 'error' for row in found.choices)} decisions: what choosing so loses of the expected error "
+            "of the map against the best candidate, mean (and worst), and the median rank correlation with it."
+        ),
+        choices=_choices(found),
         figures="".join(_figure(figure, pictures[figure.name]) for figure in figures),
         tables=", ".join(f'<a href="tables/{escape(name)}.csv">{escape(name)}</a>' for name in tables),
         facts="".join(f"<tr><td>{escape(name)}</td><td>{escape(value)}</td></tr>" for name, value in facts(found).items()),
@@ -115,6 +121,13 @@ def _claim_row(claim: Claim) -> str:
         for label, text in cells
     )
     return f'<tr data-holds="{verdict}" data-topic="{escape(claim.topic)}">{written}</tr>'
+
+
+def _choices(found: Reproduction) -> str:
+    """Rows of a table, the first its header."""
+    header, *lines = choice_cells(found.choices)
+    rows = [(header, "th"), *((line, "td") for line in lines)]
+    return "".join(f"<tr>{''.join(f'<{tag}>{escape(text)}</{tag}>' for text in cells)}</tr>" for cells, tag in rows)
 
 
 def _figure(figure: NamedFigure, png: bytes) -> str:

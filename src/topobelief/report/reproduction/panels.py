@@ -16,6 +16,22 @@ SIGNATURE_LOOKS: dict[str, tuple[str, str, str]] = {
 }
 """Label, colour and mark of each signature, in the order in which they stand."""
 
+CHOOSER_NAMES = {
+    "resistance": "s_R, resistance",
+    "map": "map entropy, exact",
+    "map_spanning_trees": "s_map",
+    "joint": "joint entropy, exact",
+    "spanning_trees": "s_ST",
+    "von_neumann": "s_VN",
+    "von_neumann_approx": "ŝ_VN, degrees",
+    "shortest": "the shortest",
+    "random": "at random",
+}
+"""Ways to choose that lose expected error, in the order in which they stand."""
+
+CLOSURE_NAMES = {"learned": "learned closures", "single": "one closure a pose", "paper": "the paper's closures"}
+"""What is predicted along a path."""
+
 NOISE_COLOURS = ("#7DB8DE", "#2F7FBF", "#0B2F5B")
 """From the least noise to the largest."""
 

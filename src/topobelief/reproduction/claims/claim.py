@@ -16,6 +16,8 @@ SIGNATURES = {
 IN_SESSIONS, IN_SYNTHETIC = "planning sessions S1 and S2", "synthetic pose graphs"
 """Where the paper says it."""
 
+BEYOND = "beyond the paper"
+
 
 @dataclass(frozen=True, slots=True)
 class Claim:
