@@ -25,12 +25,12 @@ from topobelief.io.echoed import EchoedValue, echoed_values
 from topobelief.io.files import StrPath
 from topobelief.io.part import wanted_part
 from topobelief.io.reading import ReadGraph, ReadingOptions
+from topobelief.io.transforms import FARTHEST
 from topobelief.wording import counted
 
 _BODIES, _STRIP, _LIST, _BODY_LISTS = (0, 1, 2, 3), 4, 5, (6, 7, 8)  # Marker.type: arrow, cube, sphere and cylinder; …
 _DIGITS = 6  # of metres, to which the end of a line agrees with the pose that it belongs to
 _RESOLUTION = 10.0**-_DIGITS
-_FARTHEST = 1e9  # metres
 _NO_PAIRS = np.zeros((0, 2, 3))
 _HEAD = re.compile(rb"\s*(---\s*)*markers:\s*(\[\])?\s*$", re.MULTILINE)
 
@@ -57,7 +57,8 @@ def read_markers(path: StrPath, options: ReadingOptions) -> ReadGraph:
     """Read the graph that markers draw: in SE(2) where it lies in one height, else in SE(3) with upright poses.
 
     Several messages are taken together, as of Cartographer's two topics; of a marker that comes again, the last one counts.
-    Lines drawn between the same two poses are one edge.
+    Lines drawn between the same two poses are one edge. Cartographer's submaps come first and are numbered from 0, its poses
+    from 1000 (or a higher power of ten) along the trajectory.
 
     Raises
     ------
@@ -85,17 +86,28 @@ def read_markers(path: StrPath, options: ReadingOptions) -> ReadGraph:
     ends = where[len(drawn) : len(drawn) + 2 * len(residuals)].reshape(2, -1)
     leader = _leaders(len(positions), ends)
     edges = _distinct(leader[pairs])
-    nodes = np.unique(np.concatenate([leader[where[: len(drawn)]], edges.ravel()]))
-    numbers = [marker.number for marker in bodies]
-    named = len(nodes) == len(numbers) == len(set(numbers)) == len(drawn) and min(numbers) >= 0
+    poses = np.unique(leader[where[: len(drawn)]])
+    others = np.setdiff1d(edges, poses)  # ends of lines at which nothing is drawn, as Cartographer's submaps
+    nodes = np.concatenate([others, poses])
+    index = np.zeros(len(positions), dtype=np.int64)
+    index[nodes] = np.arange(len(nodes))
     try:
-        graph = _graph(positions[nodes], np.searchsorted(nodes, edges), numbers if named else None, options)
+        graph = _graph(positions[nodes], index[edges], _ids(len(others), len(poses), len(drawn), bodies), options)
     except InvalidGraphError as error:
         raise FileError(path, str(error)) from None
     return wanted_part(path, graph, options, [_note(options)])
 
 
-def _graph(positions: FloatArray, edges: IntArray, ids: list[int] | None, options: ReadingOptions) -> PoseGraph:
+def _ids(num_others: int, num_poses: int, num_drawn: int, bodies: list[_Marker]) -> IntArray:
+    """The numbers of bodies, where each pose is one; else counts, with a gap after what is no pose of the trajectory."""
+    numbers = np.unique([marker.number for marker in bodies])
+    if num_others == 0 and len(numbers) == len(bodies) == num_drawn == num_poses and numbers[0] >= 0:
+        return numbers
+    begin = 10 ** (len(str(num_others)) + 2) if num_others and num_poses else num_others
+    return np.concatenate([np.arange(num_others), begin + np.arange(num_poses)])
+
+
+def _graph(positions: FloatArray, edges: IntArray, ids: IntArray, options: ReadingOptions) -> PoseGraph:
     """A graph at these positions, shape (n, 2) or (n, 3), with headings of travel."""
     headings = travel_headings(positions[:, :2])
     planar = positions.shape[1] == SE2_GROUP.position_dim
@@ -174,10 +186,12 @@ def _markers(path: StrPath) -> list[_Marker]:
         if value.names[:2] != ("markers", "-"):
             continue
         if value.item != begun:
-            found[marker.namespace, marker.number] = marker
+            if begun:
+                found[marker.namespace, marker.number] = marker
             marker, begun = _Marker(value.line), value.item
         _take(path, marker, value)
-    found[marker.namespace, marker.number] = marker
+    if begun:
+        found[marker.namespace, marker.number] = marker
     return list(found.values())
 
 
@@ -212,7 +226,7 @@ def _number(path: StrPath, value: EchoedValue) -> float:
         number = float(value.value)
     except ValueError:
         number = math.nan
-    if not abs(number) <= _FARTHEST:
+    if not abs(number) <= FARTHEST:
         raise FileError(path, f"expected a number of metres for {value.names[-1]}, got {value.value[:40]!r}", line=value.line)
     return number
 

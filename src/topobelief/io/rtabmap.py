@@ -17,9 +17,11 @@ from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 import numpy as np
+from numpy.typing import NDArray
 
 from topobelief.arrays import BoolArray, FloatArray, IntArray
 from topobelief.errors import FileError, InvalidGraphError
@@ -133,10 +135,7 @@ class _Database:
         if missing:
             shown = ", ".join(sorted(names)[:5])[:80] or "none"
             raise FileError(self.path, f"expected a database of RTAB-Map with the table {missing[0]}, got tables: {shown}")
-        for table, needed in (
-            ("Node", ("id", "pose")),
-            ("Link", ("from_id", "to_id", "type", "information_matrix", "transform")),
-        ):
+        for table, needed in _COLUMNS.items():
             columns = self._columns(table)
             absent = [name for name in needed if name not in columns]
             if absent:
@@ -170,10 +169,8 @@ class _Database:
         if not len(order):
             return _Links(order, np.zeros((0, 7)), np.zeros((0, 6, 6)))
         matrices = np.array(information).reshape(-1, 6, 6)
-        with np.errstate(over="ignore"):
-            return _Links(
-                order, self._poses(transforms, [f"the link {i} - {j}" for i, j in ends]), (matrices + matrices.mT) / 2
-            )
+        poses = self._poses(np.array(transforms), [f"the link {i} - {j}" for i, j in ends])
+        return _Links(order, poses, matrices / 2 + matrices.mT / 2)
 
     def _refuse_foreign(self, counts: dict[int, int]) -> None:
         """Refuse links that are not between poses, all kinds at once, or note those that are dropped."""
@@ -200,7 +197,9 @@ class _Database:
         """Poses of shape (n, 7) from 12 numbers each."""
         poses, wrong = poses_of_matrices(transforms.reshape(-1, 3, 4))
         if wrong is not None:
-            raise FileError(self.path, f"expected a rotation and a translation for {names[wrong]}, got another matrix")
+            raise FileError(
+                self.path, f"expected a rotation and a position within 1e9 m for {names[wrong]}, got another matrix"
+            )
         return poses
 
     def _definite(self, links: _Links) -> _Links:
@@ -231,19 +230,15 @@ class _Database:
 
     def _odometry(self) -> dict[int, object]:
         """The pose by odometry of each node, as it is stored."""
-        return {
-            node: pose
-            for node, pose in self._database.execute("SELECT id, pose FROM Node")
-            if isinstance(node, int) and node > 0
-        }
+        nodes = self._database.execute("SELECT id, pose FROM Node")
+        return {node: pose for node, pose in nodes if isinstance(node, int) and node > 0}
 
     def _require_nodes(self, links: _Links, odometry: dict[int, object]) -> None:
         for start, end in links.ends.tolist():
             if start not in odometry or end not in odometry:
                 absent = start if start not in odometry else end
-                raise FileError(
-                    self.path, f"expected a node at both ends of the link {start} - {end}, got none with id {absent}"
-                )
+                message = f"expected a node at both ends of the link {start} - {end}, got none with id {absent}"
+                raise FileError(self.path, message)
 
     def _optimised(self) -> dict[int, FloatArray]:
         """Poses of the last optimisation by id; landmarks have negative ids and are left out."""
@@ -258,14 +253,11 @@ class _Database:
             raise FileError(self.path, f"expected {12 * len(ids)} numbers in opt_poses for {len(ids)} ids, got {len(numbers)}")
         real = ids > 0
         names = [f"the optimised pose of node {node}" for node in ids[real].tolist()]
-        matrices = numbers.reshape(-1, 12)[real].astype(np.float64)
-        finite = np.isfinite(matrices).all(axis=1)
-        if not finite.all():
-            raise FileError(self.path, f"expected finite numbers for {names[int(np.argmin(finite))]}, got nan or infinity")
-        return dict(zip(ids[real].tolist(), self._poses(matrices, names), strict=True))
+        poses = self._poses(numbers.reshape(-1, 12)[real].astype(np.float64), names)
+        return dict(zip(ids[real].tolist(), poses, strict=True))
 
-    def _array(self, blob: object, kind: type, name: str) -> np.ndarray:
-        """A compressed array, flat; never more than thousand times the size of the file."""
+    def _array(self, blob: object, kind: type, name: str) -> NDArray[Any]:
+        """A compressed array, flat; never more than a thousand times the size of the file."""
         content = blob if isinstance(blob, bytes) else b""
         rows, columns = np.frombuffer(content[-12:-4], dtype="<i4").tolist() if len(content) > 12 else (0, 0)
         expected = rows * columns * np.dtype(kind).itemsize
@@ -293,10 +285,11 @@ class _Database:
         for index in firsts.tolist():
             if int(labels[index]) not in held:
                 known[index] = self._odometry_pose(int(ids[index]), odometry)
-        if len(known) < len(ids):
-            counts = f"{len(ids) - len(set(optimised) & set(ids.tolist()))} of {len(ids)}"
+        composed = sum(node not in optimised for node in ids.tolist())
+        if composed:
+            without = f"{composed} of {counted(len(ids), 'node')}"
             self.notes.append(
-                f"composed the poses of {counts} nodes from links, because no optimised ones are stored; optimise them"
+                f"composed poses from odometry and links for {without} without an optimised one; optimise the graph"
             )
         indices = sorted(known)
         poses = np.array([known[index] for index in indices])
@@ -306,4 +299,4 @@ class _Database:
         if odometry[node] is None:
             return SE3_GROUP.identity()
         name = f"the pose of node {node}"
-        return self._poses([self._numbers(odometry[node], 12, np.float32, name)], [name])[0]
+        return self._poses(self._numbers(odometry[node], 12, np.float32, name), [name])[0]

@@ -25,13 +25,12 @@ from topobelief.io.filed_path import finite_numbers, numbered_lines, unit_quater
 from topobelief.io.files import StrPath, read_text
 from topobelief.io.part import wanted_part
 from topobelief.io.reading import ReadGraph, ReadingOptions
-from topobelief.io.transforms import poses_of_matrices
+from topobelief.io.transforms import FARTHEST, poses_of_matrices
 from topobelief.io.tum import tum_rows
 from topobelief.wording import counted
 
 _KITTI = "r11 r12 r13 x r21 r22 r23 y r31 r32 r33 z"
 _NUM_FIELDS = (8, 12)
-_FARTHEST = 1e9  # metres, at which positions still resolve a micrometre
 _NEIGHBOURS = 64  # nearest poses among which a closure is sought; spacing leaves some 20 of the robot's own last way in reach
 _FORWARD_UP = Rotation.from_matrix([[0, 0, 1], [-1, 0, 0], [0, -1, 0]])  # T_body_camera
 
@@ -80,17 +79,12 @@ def _poses(path: StrPath) -> tuple[FloatArray, list[str]]:
     _, first = next(numbered_lines(read_text(path)))
     if len(first.split()) == _NUM_FIELDS[0]:
         rows, lines = tum_rows(path)
-        _require_near(path, rows[:, 1:4], lines)
+        far = np.flatnonzero(np.abs(rows[:, 1:4]).max(axis=1) > FARTHEST)
+        if far.size:
+            message = f"expected positions within {FARTHEST:.0e} m of the origin, got one beyond"
+            raise FileError(path, message, line=lines[int(far[0])])
         return np.column_stack([rows[:, 1:4], unit_quaternions(path, rows[:, 4:], lines)]), []
     return _kitti_poses(path)
-
-
-def _require_near(path: StrPath, positions: FloatArray, lines: list[int]) -> None:
-    far = np.flatnonzero(np.abs(positions).max(axis=1) > _FARTHEST)
-    if far.size:
-        raise FileError(
-            path, f"expected positions within {_FARTHEST:.0e} m of the origin, got one beyond", line=lines[int(far[0])]
-        )
 
 
 def _kitti_poses(path: StrPath) -> tuple[FloatArray, list[str]]:
@@ -101,10 +95,9 @@ def _kitti_poses(path: StrPath) -> tuple[FloatArray, list[str]]:
         lines.append(number)
     poses, wrong = poses_of_matrices(np.array(numbers).reshape(-1, 3, 4))
     if wrong is not None:
-        message = "expected a rotation matrix in columns 1-3, 5-7 and 9-11, got one whose rows are no right-handed unit vectors"
+        message = "expected a rotation matrix in columns 1-3, 5-7 and 9-11 and a position within 1e9 m, got other numbers"
         raise FileError(path, message, line=lines[wrong])
     positions, rotations = poses[:, :3], Rotation.from_quat(poses[:, 3:])
-    _require_near(path, positions, lines)
     moves = np.diff(positions, axis=0)
     steps = np.abs(rotations[:-1].inv().apply(moves)).mean(axis=0) if len(moves) else np.zeros(3)
     if steps[2] <= max(steps[0], steps[1]):

@@ -7,11 +7,14 @@ from scipy.spatial.transform import Rotation
 
 from topobelief.arrays import FloatArray
 
+FARTHEST = 1e9  # metres from the origin, at which positions still resolve a micrometre
 _SKEW = 0.01  # of a rotation matrix, which files give in few digits
 
 
 def poses_of_matrices(matrices: FloatArray) -> tuple[FloatArray, int | None]:
-    """Poses of shape (n, 7) from the upper three rows of matrices, shape (n, 3, 4); or the index of the first that is no motion.
+    """Poses of shape (n, 7) from the upper three rows of matrices, shape (n, 3, 4), or the index of the first that is none.
+
+    A pose has a right-handed rotation and a position within 1e9 m.
 
     Examples
     --------
@@ -23,6 +26,7 @@ def poses_of_matrices(matrices: FloatArray) -> tuple[FloatArray, int | None]:
     rotations = matrices[:, :, :3]
     with np.errstate(over="ignore", invalid="ignore"):
         proper = np.abs(rotations @ rotations.mT - np.eye(3)).max(axis=(1, 2), initial=0.0) <= _SKEW
+    proper &= np.abs(matrices[:, :, 3]).max(axis=1, initial=0.0) <= FARTHEST
     proper[proper] = np.linalg.det(rotations[proper]) > 0
     if not proper.all():
         return np.zeros((0, 7)), int(np.argmin(proper))
