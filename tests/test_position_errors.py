@@ -16,6 +16,7 @@ from references import covariance_reference, error_reference
 from topobelief import position_errors as module
 from topobelief.conversions.gtsam import to_gtsam
 from topobelief.errors import DisconnectedGraphError, IllConditionedError, InvalidInputError
+from topobelief.estimation import optimize
 from topobelief.graph.action import posterior
 from topobelief.graph.information import block_isotropic
 from topobelief.graph.pose_graph import PoseGraph
@@ -167,3 +168,29 @@ def test_what_cannot_be_answered_is_said():
     far = 1e14 * np.random.default_rng(0).normal(size=(4, 3))
     with pytest.raises(IllConditionedError, match=r"expected error of the map.* m\)"):
         expected_errors(PoseGraph(far, [(0, 1), (1, 2), (2, 3), (3, 0)], None, omega))
+
+
+@pytest.mark.parametrize("group", [SE2_GROUP, SE3_GROUP])
+def test_redrawn_measurements_leave_as_much_error_as_expected(group):
+    """Monte Carlo where linearisation holds: optimise, align, and take the root mean square over poses and draws."""
+    rng, num_draws = np.random.default_rng(11), 150
+    graph = random_pose_graph(rng, Noise(group, "full", 1e4, 0.3, 2.0), 16, 8)
+    factors = np.linalg.cholesky(np.linalg.inv(graph.information))
+    squares = []
+    for _ in range(num_draws):
+        noise = np.einsum("mab,mb->ma", factors, rng.normal(size=(graph.num_edges, graph.tangent_dim)))
+        measured = group.compose(graph.measurements, group.exp(noise))
+        estimate = optimize(PoseGraph(graph.poses, graph.edges, measured, graph.information))
+        squares.append(np.mean(np.sum(aligned_difference(estimate.positions, graph.positions) ** 2, axis=1)))
+    spread = np.std(squares) / math.sqrt(num_draws)
+    assert np.mean(squares) == pytest.approx(expected_errors(graph).map_rmse ** 2, abs=4 * spread)
+    assert 4 * spread < 0.25 * np.mean(squares)
+
+
+def aligned_difference(positions, reference):
+    """After the best rotation and translation (Kabsch)."""
+    p, q = positions - positions.mean(axis=0), reference - reference.mean(axis=0)
+    left, _, right = np.linalg.svd(p.T @ q)
+    sign = np.ones(p.shape[1])
+    sign[-1] = np.sign(np.linalg.det(left @ right))
+    return p @ (left * sign) @ right - q

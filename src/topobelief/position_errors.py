@@ -25,7 +25,7 @@ from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg.estimate import Estimate
 from topobelief.linalg.inverse import InverseSolver
 
-_COMPILED_SIZE = 3000  # poses beyond which loading compiled kernels is worth its time
+_COMPILED_SIZE = 6000  # variables beyond which loading compiled kernels is worth its time
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +113,7 @@ def _relative_position(graph: PoseGraph, goal: int) -> FloatArray:
 
 def _traces(graph: PoseGraph, wanted: list[tuple[IntArray, FloatArray]]) -> list[Estimate[float]]:
     """tr(A^T I^-1 A) for columns A given at some poses."""
-    if graph.num_poses > _COMPILED_SIZE and find_spec("numba") is not None:
+    if graph.num_poses * graph.tangent_dim > _COMPILED_SIZE and find_spec("numba") is not None:
         from topobelief.forms.prior_factors import PriorFactors
         from topobelief.linalg.solutions import inverse_trace
 

@@ -57,7 +57,7 @@ def test_a_session_may_begin_with_a_recorded_graph(specification_file):
         ("seeds: 3", "seeds: 3\nseeds: 4", 11, "seeds: expected each key once, got 'seeds' twice"),
         ("[spanning_trees, random]", "[spanning_tree]", 8, "strategies[0]: expected one of spanning_trees, von_neumann"),
         ("[joint]", "[]", 9, "objectives: expected a list, got a list of 0"),
-        ("[joint]", "[entropy]", 9, "objectives[0]: expected one of joint, map, per_pose, got 'entropy'"),
+        ("[joint]", "[entropy]", 9, "objectives[0]: expected one of joint, map, per_pose, error, got 'entropy'"),
         ("1e-2", "0", 6, "noises[0].sigma_theta: expected a number above 0, got '0'"),
         ("1e-2", "tiny", 6, "noises[0].sigma_theta: expected a number above 0, got 'tiny'"),
         ("1e-2", ".nan", 6, "noises[0].sigma_theta: expected a number above 0"),
