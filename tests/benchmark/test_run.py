@@ -2,22 +2,33 @@
 
 import json
 import math
+import time
 
 import numpy as np
 import pytest
 
 from graphs import SE3_GROUP, Noise, random_pose_graph
-from topobelief import PoseGraph, joint_entropy, log_num_spanning_trees, posterior, von_neumann_entropy, write_g2o
+from references import error_reference
+from topobelief import (
+    PoseGraph,
+    joint_entropy,
+    learn_closures,
+    log_num_spanning_trees,
+    posterior,
+    von_neumann_entropy,
+    write_g2o,
+)
 from topobelief.benchmark import run
 from topobelief.benchmark.baselines import Baseline, baselines
 from topobelief.benchmark.certificates import error_bounds, proof_size
 from topobelief.benchmark.memory import peak_gigabytes
+from topobelief.benchmark.predicted import bounds_of_candidates, predicted_candidates
 from topobelief.benchmark.run import BenchmarkPlan, run_benchmark
 from topobelief.benchmark.sessions import BenchmarkSession, candidate_paths, city_drive
 from topobelief.benchmark.timing import MethodTime, SessionTimes, time_session
 from topobelief.errors import InvalidInputError
 from topobelief.graph.information import block_isotropic
-from topobelief.report.benchmark_tables import session_table
+from topobelief.report.benchmark_tables import candidate_table, session_table
 from topobelief.signatures.von_neumann import von_neumann_entropy_approx
 
 INFORMATION = block_isotropic(0.1, 0.035)
@@ -100,6 +111,7 @@ def test_all_ways_to_evaluate_agree(three_dimensional):
         "tau": log_num_spanning_trees(after.topology),
         "s_VN": von_neumann_entropy(after.topology),
         "s_VN by degrees": von_neumann_entropy_approx(after.topology),
+        "E": error_reference(graph, after),
     }
     for method in baselines():
         assert method.prepare(graph)(action)() == pytest.approx(expected[method.quantity], rel=1e-9), method.name
@@ -121,6 +133,10 @@ def test_a_session_is_timed_by_every_method_that_suits_its_size():
         "signature and chain bounds",
         "proven optimum",
         "exact J of all",
+        "signature resistance",
+        "resistance and bounds of E",
+        "proven optimum of E",
+        "exact E of all",
     ]
     assert len(told) == len(names) + 1
     assert times.largest_deviation < 1e-9
@@ -145,7 +161,7 @@ def test_a_method_that_fails_on_a_graph_is_reported_and_the_rest_goes_on():
     failing = Baseline("standard BSP, GTSAM, COLAMD", "log det I", "standard", math.inf, prepare)
     times = time_session(session, num_actions=2, repetitions=1, methods=[failing])
     assert times.methods[0].note == "fails: Indeterminate linear system detected while working near variable 7"
-    assert len(times.methods) == 8
+    assert len(times.methods) == 12
     assert times.gtsam is times.best_from_scratch is None
     result = run.BenchmarkResult(BenchmarkPlan(), {}, (times,))
     row = json.loads(json.dumps(result.to_dict(), allow_nan=False))["sessions"][0]["methods"][0]
@@ -203,10 +219,14 @@ def test_the_result_grows_part_by_part_and_goes_into_json(tmp_path):
         bounds_actions=4,
         memory_sizes=(20,),
         small=(25, 2),
+        predicted_actions=4,
     )
     results = list(run_benchmark(plan))
-    counts = [len(result.sessions) + len(result.memory) + len(result.error_bounds) + len(result.proofs) for result in results]
-    assert counts == [0, 1, 2, 3, 4, 5, 6, 15]
+    counts = [
+        len(result.sessions) + len(result.memory) + len(result.error_bounds) + len(result.proofs) + len(result.candidates)
+        for result in results
+    ]
+    assert counts == [0, 1, 2, 3, 4, 5, 6, 15, 26]
     document = json.loads(json.dumps(results[-1].to_dict(), allow_nan=False))
     assert document["schema"] == run.SCHEMA
     assert document["plan"]["files"] == ["drive.g2o"]
@@ -226,6 +246,66 @@ def test_ratios_are_of_whole_sessions():
     rows = run.BenchmarkResult(BenchmarkPlan(), {}, (times,)).to_dict()["sessions"][0]["methods"]
     assert [row["times_faster_than_gtsam"] for row in rows] == pytest.approx([0.5, 1.0, 1.25, 100.0])
     assert [row["times_faster_than_best_from_scratch"] for row in rows] == pytest.approx([0.4, 0.8, 1.0, 80.0])
+
+
+def test_ratios_compare_methods_of_one_objective():
+    methods = (
+        MethodTime("standard BSP, GTSAM, COLAMD", "standard", 0.0, 0.2, 20.0, 5),
+        MethodTime("E from GTSAM's marginals", "error", 0.0, 1.0, 100.0, 5, objective="error"),
+        MethodTime("E from scratch", "error", 0.0, 0.5, 50.0, 5, objective="error"),
+        MethodTime("exact J of all", "engine", 0.1, 0.0, 0.2, 5),
+        MethodTime("exact E of all", "engine", 0.1, 0.0, 0.5, 5, objective="error"),
+    )
+    times = SessionTimes("x", 10, 12, 100, 5.0, 2.0, methods, 0.1, 1e-12)
+    assert times.gtsam is times.best_from_scratch is methods[0]
+    assert times.ratios(methods[3]) == pytest.approx((100, 100))
+    assert times.ratios(methods[4]) == pytest.approx((200, 100))
+
+
+def test_one_path_has_few_closures_those_of_its_graph_s_history_or_those_of_the_paper_s_rule():
+    graph = city(400)
+    found = {kind: predicted_candidates(graph, 10, kind, seed=1)[0] for kind in ("nearest", "learned", "paper")}
+    for few, learned, many in zip(*found.values(), strict=True):
+        assert few.num_new_poses == 30
+        np.testing.assert_allclose(few.poses[-1, :2], learned.poses[-1, :2])
+        np.testing.assert_allclose(learned.poses, many.poses)
+        assert learned.expected_closures <= learned.num_closures
+        assert learned.num_closures <= learn_closures(graph).max_per_pose * learned.num_new_poses
+    mean = {kind: np.mean([action.num_closures for action in actions]) for kind, actions in found.items()}
+    assert mean["nearest"] == 6
+    assert mean["nearest"] < mean["learned"] < mean["paper"]
+
+
+def test_candidates_of_three_kinds_are_bounded_by_every_family_and_those_of_plan_by_their_errors_too():
+    rows = list(bounds_of_candidates("city", city(150), num_actions=5, repetitions=1, seed=0))
+    assert [(row.candidates, row.objective, row.bounds) for row in rows if row.candidates != "paper"] == [
+        (kind, *pair)
+        for kind in ("nearest", "learned")
+        for pair in (("joint", "fischer"), ("joint", "anchored"), ("joint", "chain"), ("error", "exact"))
+    ]
+    assert [row.bounds for row in rows if row.candidates == "paper"] == ["fischer", "anchored", "chain"]
+    for row in rows:
+        assert 1 <= row.num_survivors <= row.num_actions == 5
+        assert 0 < row.width < (1e-6 if row.objective == "error" else math.inf)
+    shown = " ".join(str(cell) for column in candidate_table(rows).columns for cell in column.cells)
+    assert "learned" in shown
+    assert f"{rows[0].num_survivors} of 5" in shown
+
+
+def test_candidates_in_three_dimensions_have_no_paths_in_the_plane():
+    with pytest.raises(InvalidInputError, match="expected a graph in SE"):
+        predicted_candidates(tangle("isotropic", 20), 3, "learned", seed=0)
+
+
+def test_time_is_that_of_the_clock():
+    graph = city(40)
+    session = BenchmarkSession(
+        "small", graph, candidate_paths(graph, 4, num_new_poses=5, num_closures=1, rng=np.random.default_rng(0))
+    )
+    ticks = iter(range(100_000))
+    times = time_session(session, num_actions=2, repetitions=1, clock=lambda: float(next(ticks)))
+    assert {method.total for method in times.methods if method.kind == "engine"} == {1.0}
+    assert BenchmarkPlan(cpu_time=True).clock is time.process_time
 
 
 @pytest.mark.parametrize("wrong", [{"num_actions": 1}, {"repetitions": 0}, {"sizes": (1,)}, {"seed": -1}])

@@ -15,7 +15,15 @@ from topobelief.graph.information import block_isotropic
 @pytest.fixture
 def tiny(monkeypatch):
     plan = BenchmarkPlan(
-        sizes=(30,), num_actions=3, repetitions=1, num_seeds=1, bounds_size=40, bounds_actions=4, memory_sizes=(20,), small=None
+        sizes=(30,),
+        num_actions=3,
+        repetitions=1,
+        num_seeds=1,
+        bounds_size=40,
+        bounds_actions=4,
+        memory_sizes=(20,),
+        small=None,
+        predicted_actions=4,
     )
     monkeypatch.setattr(BenchmarkPlan, "quick", staticmethod(lambda: plan))
 
@@ -29,6 +37,7 @@ def test_a_benchmark_prints_tables_and_writes_its_numbers(tiny, tmp_path, capsys
         "Peak memory",
         "ΔJ_max",
         "generated, 30: 30 poses",
+        "exact E of all",
         "benchmark.json",
     ):
         assert text in shown
@@ -52,13 +61,14 @@ def test_a_file_alone(tiny, tmp_path, capsys):
     assert [session["name"] for session in document["sessions"]] == ["mine"]
     assert document["memory"] == document["error_bounds"] == []
     assert len(document["proofs"]) == 9
+    assert {row["candidates"] for row in document["candidates"]} == {"nearest", "learned", "paper"}
 
 
 def test_options_go_before_the_quick_plan_and_json_is_all_that_is_printed(tiny, capsys):
-    assert run(["benchmark", "--quick", "--sizes", "25,35", "--candidates", "2", "--seed", "3", "--json"]) == 0
+    assert run(["benchmark", "--quick", "--sizes", "25,35", "--candidates", "2", "--seed", "3", "--cpu-time", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert [session["num_poses"] for session in document["sessions"]] == [25, 35]
-    assert (document["plan"]["num_actions"], document["plan"]["seed"]) == (2, 3)
+    assert (document["plan"]["num_actions"], document["plan"]["seed"], document["plan"]["cpu_time"]) == (2, 3, True)
 
 
 def test_an_interrupted_benchmark_leaves_what_it_has(tiny, tmp_path, monkeypatch, capsys):

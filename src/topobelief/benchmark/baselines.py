@@ -19,17 +19,19 @@ from scipy import linalg
 from topobelief.arrays import FloatArray, IntArray
 from topobelief.conversions.gtsam import load_gtsam, to_gtsam
 from topobelief.graph.action import Action, posterior
+from topobelief.graph.alignment import DEFAULT_SAMPLE_SIZE, Alignment
 from topobelief.graph.fisher import fisher_rows
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg.block_pattern import BlockPattern
 from topobelief.linalg.edge_form import EdgeForm, laplacian_form
+from topobelief.position_errors import expected_errors
 from topobelief.signatures.von_neumann import von_neumann_entropy, von_neumann_entropy_approx
 
 _QDLDL: Any = qdldl  # ships no types
 
-Quantity = Literal["log det I", "tau", "s_VN", "s_VN by degrees"]
+Quantity = Literal["log det I", "tau", "s_VN", "s_VN by degrees", "E"]
 
-BaselineKind = Literal["standard", "lemma", "topology"]
+BaselineKind = Literal["standard", "lemma", "topology", "error"]
 
 Evaluate = Callable[[], float]
 """The clock runs while it is called."""
@@ -46,7 +48,7 @@ class Baseline:
         What it computes.
     kind
         "standard": standard belief space planning, from scratch; "lemma": the same by the determinant lemma; "topology":
-        signatures from scratch.
+        signatures from scratch; "error": the expected error of the map, from scratch.
     largest_graph
         Poses of the prior above which it would take minutes or more memory than there is.
     prepare
@@ -72,6 +74,8 @@ def baselines() -> tuple[Baseline, ...]:
         Baseline("t-BSP from scratch, s_ST", "tau", "topology", math.inf, _spanning_trees),
         Baseline("t-BSP from scratch, ŝ_VN", "s_VN by degrees", "topology", math.inf, _von_neumann_approx),
         Baseline("t-BSP from scratch, exact s_VN", "s_VN", "topology", 2000, _von_neumann),
+        Baseline("E from GTSAM's marginals", "E", "error", math.inf, _gtsam_marginals),
+        Baseline("E from scratch", "E", "error", math.inf, lambda graph: lambda action: lambda: _error(graph, action)),
     )
 
 
@@ -127,23 +131,10 @@ def _ramdl_on_isam2(graph: PoseGraph) -> Callable[[Action], Evaluate]:
     inference = gtsam.ISAM2()
     inference.update(factors, values)
     log_det = 2 * float(factors.linearize(values).eliminateMultifrontal(gtsam.Ordering.OrderingType.COLAMD).logDeterminant())
-    k, kappa = graph.group.position_dim, graph.tangent_dim
-    order = np.arange(3) if kappa == 3 else np.array([3, 4, 5, 0, 1, 2])
 
     def covariance(touched: IntArray) -> FloatArray:
-        """Of the touched poses, shape (len(touched) kappa, len(touched) kappa); GTSAM's is in each pose's own frame."""
         inference.deleteCachedShortcuts()  # else later actions would reuse the marginals of earlier ones
-        keys: list[int] = graph.ids[touched].tolist()
-        joint = inference.jointMarginalCovariance(keys)
-        ranks = np.argsort(np.argsort(keys))  # GTSAM sorts keys
-        indices = (ranks[:, None] * kappa + order).ravel()
-        matrix: FloatArray = joint.fullMatrix()[np.ix_(indices, indices)]
-        turn = np.tile(np.eye(kappa), (len(touched), 1, 1))
-        turn[:, :k, :k] = graph.group.rotation_matrix(graph.poses[touched])
-        if kappa == 6:
-            turn[:, k:, k:] = turn[:, :k, :k]
-        blocks = matrix.reshape(len(touched), kappa, len(touched), kappa)
-        return np.einsum("iab,ibjd,jcd->iajc", turn, blocks, turn, optimize=True).reshape(matrix.shape)
+        return _joint_covariance(graph, touched, inference)
 
     return lambda action: _ramdl(graph, action, log_det, covariance)
 
@@ -169,6 +160,22 @@ def _ramdl_on_dense_covariance(graph: PoseGraph) -> Callable[[Action], Evaluate]
         return matrix
 
     return lambda action: _ramdl(graph, action, log_det, covariance)
+
+
+def _joint_covariance(graph: PoseGraph, nodes: IntArray, source: Any) -> FloatArray:
+    """Of some poses in the world, shape (len(nodes) kappa, len(nodes) kappa), from GTSAM, whose is in each pose's own frame."""
+    k, kappa, keys = graph.group.position_dim, graph.tangent_dim, graph.ids[nodes].tolist()
+    joint = source.jointMarginalCovariance(keys)
+    order = np.arange(3) if kappa == 3 else np.array([3, 4, 5, 0, 1, 2])
+    ranks = np.argsort(np.argsort(keys))  # GTSAM sorts keys
+    indices = (ranks[:, None] * kappa + order).ravel()
+    matrix: FloatArray = joint.fullMatrix()[np.ix_(indices, indices)]
+    turn = np.tile(np.eye(kappa), (len(nodes), 1, 1))
+    turn[:, :k, :k] = graph.group.rotation_matrix(graph.poses[nodes])
+    if kappa == 6:
+        turn[:, k:, k:] = turn[:, :k, :k]
+    blocks = matrix.reshape(len(nodes), kappa, len(nodes), kappa)
+    return np.einsum("iab,ibjd,jcd->iajc", turn, blocks, turn, optimize=True).reshape(matrix.shape)
 
 
 def _held_factors(graph: PoseGraph, anchor: int) -> tuple[Any, Any]:
@@ -207,6 +214,33 @@ def _ramdl(graph: PoseGraph, action: Action, log_det: float, covariance: Callabl
         return log_det + 2 * float(np.log(np.diag(factor)).sum() + np.log(np.diag(gain)).sum())
 
     return evaluate
+
+
+# The expected error of the map, over a sample of its poses
+
+
+def _gtsam_marginals(graph: PoseGraph) -> Callable[[Action], Evaluate]:
+    """Linearise and eliminate the whole posterior; the joint covariance of the sample gives E."""
+    gtsam, alignment = load_gtsam(), Alignment.of(graph.positions, DEFAULT_SAMPLE_SIZE)
+    k, kappa, count = graph.group.position_dim, graph.tangent_dim, alignment.count
+    projection = alignment.columns(k).reshape(count * k, count * k)
+    positions = (kappa * np.arange(count)[:, None] + np.arange(k)).ravel()
+
+    def ready(action: Action) -> Evaluate:
+        factors, values = _held_factors(posterior(graph, action), anchor_of(graph))
+
+        def evaluate() -> float:
+            covariance = _joint_covariance(graph, alignment.nodes, gtsam.Marginals(factors, values))
+            return math.sqrt(float(np.sum(projection * covariance[np.ix_(positions, positions)])) / count)
+
+        return evaluate
+
+    return ready
+
+
+def _error(graph: PoseGraph, action: Action) -> float:
+    """A factor of the posterior's information matrix, and one triangular solution for each column of Pi."""
+    return expected_errors(graph, action).map_rmse
 
 
 # t-BSP from scratch, as in the paper

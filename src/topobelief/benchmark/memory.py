@@ -14,7 +14,7 @@ from topobelief.errors import InvalidInputError, require_choice
 from topobelief.graph.information import block_isotropic
 from topobelief.planning.planner import Planner
 
-Work = Literal["nothing", "bounds", "exact"]
+Work = Literal["nothing", "bounds", "exact", "error"]
 
 
 def peak_gigabytes(num_poses: int, num_actions: int, work: Work, *, seed: int) -> float:
@@ -24,7 +24,8 @@ def peak_gigabytes(num_poses: int, num_actions: int, work: Work, *, seed: int) -
     ----------
     num_poses, num_actions
     work
-        "bounds": ranking with Fischer bounds. "exact": the joint entropy of all. "nothing": the session alone.
+        "bounds": ranking with Fischer bounds. "exact": the joint entropy of all. "error": the expected
+        error of all. "nothing": the session alone.
     seed
 
     Raises
@@ -51,6 +52,8 @@ def main(arguments: list[str]) -> None:
         Planner(graph).decide(actions)
     elif work == "exact":
         Planner(graph).entropies(actions)
+    elif work == "error":
+        Planner(graph, objective="error", signature="resistance", engine="incremental").entropies(actions)
     print(_peak_bytes() / 1e9)
 
 

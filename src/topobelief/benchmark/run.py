@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
 from itertools import product
@@ -17,9 +17,10 @@ from topobelief.benchmark.certificates import (
     error_bounds,
     proof_size,
 )
-from topobelief.benchmark.memory import peak_gigabytes
+from topobelief.benchmark.memory import Work, peak_gigabytes
+from topobelief.benchmark.predicted import BoundsOfCandidates, bounds_of_candidates
 from topobelief.benchmark.sessions import BenchmarkSession, ClosureStyle, candidate_paths, city_drive
-from topobelief.benchmark.timing import SessionTimes, degree_seconds, time_session
+from topobelief.benchmark.timing import Clock, SessionTimes, degree_seconds, time_session
 from topobelief.errors import InvalidInputError
 from topobelief.estimation import optimize
 from topobelief.graph.information import block_isotropic
@@ -27,7 +28,7 @@ from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.formats import read_pose_graph
 from topobelief.runs.machine import describe_machine
 
-SCHEMA = "topobelief.benchmark/1"
+SCHEMA = "topobelief.benchmark/2"
 SIGMA_POSITION, SIGMA_ROTATIONS = 0.1, (0.01, 0.035, 0.085)  # the paper's noises, metres and radians
 SMALL = "small"
 
@@ -55,6 +56,10 @@ class BenchmarkPlan:
         Poses of generated graphs whose peak memory is measured.
     small
         Poses and candidates of a session as the paper has them, which is measured first; None for none.
+    cpu_time
+        Measure the processor's time, of all threads together, in place of elapsed time: where other programs run.
+    predicted_actions
+        Candidates for which closures are predicted in several ways.
     seed
     """
 
@@ -67,18 +72,28 @@ class BenchmarkPlan:
     bounds_actions: int = 200
     memory_sizes: tuple[int, ...] = (10_000, 100_000)
     small: tuple[int, int] | None = (100, 20)
+    cpu_time: bool = False
+    predicted_actions: int = 100
     seed: int = 0
+
+    @property
+    def clock(self) -> Clock:
+        """What times are read from."""
+        return time.process_time if self.cpu_time else time.perf_counter
 
     @staticmethod
     def quick() -> BenchmarkPlan:
         """A first look: one small graph, few repetitions."""
-        return BenchmarkPlan(sizes=(1000,), num_actions=300, repetitions=3, num_seeds=3, memory_sizes=(1000,))
+        return BenchmarkPlan(
+            sizes=(1000,), num_actions=300, repetitions=3, num_seeds=3, memory_sizes=(1000,), predicted_actions=30
+        )
 
     def __post_init__(self) -> None:
         for name, value, least in (
             ("num_actions", self.num_actions, 2),
             ("repetitions", self.repetitions, 1),
             ("num_seeds", self.num_seeds, 1),
+            ("predicted_actions", self.predicted_actions, 1),
             ("seed", self.seed, 0),
             *(("sizes", size, 2) for size in self.sizes),
         ):
@@ -93,8 +108,8 @@ class PeakMemory:
     Attributes
     ----------
     num_poses, num_actions
-    session, bounds, exact
-        Of a process that only makes the session; that ranks it with Fischer bounds; that evaluates all.
+    session, bounds, exact, error
+        Of a process that only makes the session; that ranks it with Fischer bounds; that computes J of all; E of all.
     """
 
     num_poses: int
@@ -102,6 +117,7 @@ class PeakMemory:
     session: float
     bounds: float
     exact: float
+    error: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,6 +135,7 @@ class BenchmarkResult:
     memory
     error_bounds
     proofs
+    candidates
     """
 
     plan: BenchmarkPlan
@@ -128,6 +145,7 @@ class BenchmarkResult:
     memory: tuple[PeakMemory, ...] = ()
     error_bounds: tuple[ErrorBounds, ...] = ()
     proofs: tuple[ProofSize, ...] = ()
+    candidates: tuple[BoundsOfCandidates, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON, seconds and 1e9 bytes, with the ratios that tables show."""
@@ -137,15 +155,8 @@ class BenchmarkResult:
             for method, row in zip(session.methods, values["methods"], strict=True):
                 for name in ("once", "per_action", "total"):
                     row[name] = getattr(method, name) if method.num_timed else None
-                row["times_faster_than_gtsam"] = ratio(session.gtsam and session.gtsam.total, method.total)
-                best = session.best_from_scratch
-                row["times_faster_than_best_from_scratch"] = ratio(best and best.total, method.total)
+                row["times_faster_than_gtsam"], row["times_faster_than_best_from_scratch"] = session.ratios(method)
         return {"schema": SCHEMA, **document}
-
-
-def ratio(slow: float | None, fast: float) -> float | None:
-    """How many times faster; None where there is nothing to compare with."""
-    return None if slow is None or not 0 < fast < math.inf else slow / fast
 
 
 def run_benchmark(plan: BenchmarkPlan, *, progress: Progress = lambda _: None) -> Iterator[BenchmarkResult]:
@@ -166,15 +177,16 @@ def run_benchmark(plan: BenchmarkPlan, *, progress: Progress = lambda _: None) -
         def tell(method: str, name: str = name) -> None:
             progress(f"{name}: {method}")
 
-        times = time_session(session, num_actions=num_actions, repetitions=plan.repetitions, progress=tell)
-        seconds = {**(result.degree_seconds or {}), name: degree_seconds(session, repetitions=plan.repetitions)}
+        repetitions, clock = plan.repetitions, plan.clock
+        times = time_session(session, num_actions=num_actions, repetitions=repetitions, clock=clock, progress=tell)
+        seconds = {**(result.degree_seconds or {}), name: degree_seconds(session, repetitions=repetitions, clock=clock)}
         result = replace(result, sessions=(*result.sessions, times), degree_seconds=seconds)
         if graph.tangent_dim == 3 and name in {path.stem for path in plan.files}:
             graphs[name] = graph
         yield result
     for size in plan.memory_sizes if plan.sizes else ():
         progress(f"memory at {size} poses")
-        works = [peak_gigabytes(size, plan.num_actions, work, seed=plan.seed) for work in ("nothing", "bounds", "exact")]
+        works = [peak_gigabytes(size, plan.num_actions, work, seed=plan.seed) for work in get_args(Work)]
         result = replace(result, memory=(*result.memory, PeakMemory(size, plan.num_actions, *works)))
         yield result
     for closures in get_args(ClosureStyle) if plan.sizes else ():
@@ -192,6 +204,18 @@ def run_benchmark(plan: BenchmarkPlan, *, progress: Progress = lambda _: None) -
     for name, graph in graphs.items():
         result = replace(result, proofs=(*result.proofs, *_proofs(name, graph, plan, progress)))
         yield result
+    for name, graph in graphs.items():
+        progress(f"{name}: closures as plan predicts them")
+        found = bounds_of_candidates(
+            name,
+            graph,
+            num_actions=plan.predicted_actions,
+            repetitions=plan.repetitions,
+            seed=plan.seed,
+            clock=plan.clock,
+        )
+        result = replace(result, candidates=(*result.candidates, *found))
+        yield result
 
 
 def _proofs(name: str, graph: PoseGraph, plan: BenchmarkPlan, progress: Progress) -> Iterator[ProofSize]:
@@ -208,6 +232,7 @@ def _proofs(name: str, graph: PoseGraph, plan: BenchmarkPlan, progress: Progress
             sigma_rotation=sigma,
             repetitions=plan.repetitions,
             seed=plan.seed,
+            clock=plan.clock,
         )
 
 

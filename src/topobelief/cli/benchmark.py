@@ -27,6 +27,9 @@ def benchmark(
     quick: Annotated[
         bool, typer.Option("--quick", help="A small graph and few candidates, for a first look: about a minute.")
     ] = False,
+    cpu_time: Annotated[
+        bool, typer.Option("--cpu-time", help="Measure the processor's time, all threads together, where other programs run.")
+    ] = False,
     out: Annotated[
         Path | None, typer.Option(help="Folder for benchmark.json, and for a picture if there are two sizes or more.")
     ] = None,
@@ -34,9 +37,9 @@ def benchmark(
 ) -> None:
     """Compare the speed of this engine with GTSAM, sparse factorisation from scratch and the determinant lemma.
 
-    Prints ratios for all candidates first, set-up included, then memory, error bounds and proofs.
+    Prints ratios for all candidates first, set-up included, then memory, error bounds, proofs and kinds of candidates.
 
-    Other programs running on the machine distort the times. Needs the extras fast and gtsam.
+    Other programs running on the machine distort the times, less so with --cpu-time. Needs the extras fast and gtsam.
     """
     from topobelief.cli.console import Reporter
     from topobelief.cli.extras import require_extras
@@ -64,6 +67,7 @@ def benchmark(
         num_actions=candidates or base.num_actions,
         repetitions=repeat or base.repetitions,
         seed=seed,
+        cpu_time=cpu_time,
     )
     result: BenchmarkResult | None = None
     with reporter.activity("measuring") as tell:

@@ -3,26 +3,33 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from rich import box
 from rich.table import Table
 
-from topobelief.benchmark.run import BenchmarkResult, ratio
+from topobelief.benchmark.predicted import BoundsOfCandidates
+from topobelief.benchmark.run import BenchmarkResult
 from topobelief.benchmark.timing import SessionTimes
 
 
 def benchmark_tables(result: BenchmarkResult) -> Iterable[Table | str]:
-    """One table a session, then memory, error bounds and proofs."""
-    yield "; ".join(f"{name} {value}" for name, value in result.machine.items())
+    """One table a session, then memory, error bounds, proofs and kinds of candidates."""
+    clock = "; times are of the processor, all threads together" if result.plan.cpu_time else ""
+    yield "; ".join(f"{name} {value}" for name, value in result.machine.items()) + clock
     for session in result.sessions:
         yield session_table(session, (result.degree_seconds or {}).get(session.name))
     if result.memory:
         table = _table(
-            "Peak memory of a process, GB", "poses", "session alone", "ranking with Fischer bounds", "exact J of all"
+            "Peak memory of a process, GB",
+            "poses",
+            "session alone",
+            "ranking with Fischer bounds",
+            "exact J of all",
+            "exact E of all",
         )
         for row in result.memory:
-            table.add_row(f"{row.num_poses}", f"{row.session:.2f}", f"{row.bounds:.2f}", f"{row.exact:.2f}")
+            table.add_row(f"{row.num_poses}", *(f"{value:.2f}" for value in (row.session, row.bounds, row.exact, row.error)))
         yield table
     if result.error_bounds:
         first = result.error_bounds[0]
@@ -44,6 +51,49 @@ def benchmark_tables(result: BenchmarkResult) -> Iterable[Table | str]:
             counts = f"{row.num_survivors} of {row.num_actions}", str(row.num_evaluations), f"{100 * share:.1f} %"
             table.add_row(row.name, f"{row.sigma_rotation}", row.bounds, *counts, f"{row.seconds:.2f}")
         yield table
+    if result.candidates:
+        yield candidate_table(result.candidates)
+
+
+def candidate_table(rows: Sequence[BoundsOfCandidates]) -> Table:
+    """One row a graph, kind of candidates, objective and family."""
+    columns = (
+        "closures a path",
+        "expected",
+        "objective",
+        "bounds",
+        "width",
+        "may be the best",
+        "with bounds, s",
+        "exact of all, s",
+    )
+    table = _table(
+        f"{rows[0].num_actions} candidates of about 30 new poses by their closures",
+        "graph",
+        "candidates",
+        *columns,
+        caption=_rules(rows),
+    )
+    for row in rows:
+        objective, unit = ("J", "nats") if row.objective == "joint" else ("E", "m")
+        table.add_row(
+            row.name,
+            row.candidates,
+            f"{row.num_closures:.0f}",
+            f"{row.expected_closures:.1f}",
+            objective,
+            row.bounds,
+            f"{row.width:.2g} {unit}",
+            f"{row.num_survivors} of {row.num_actions}",
+            _digits(row.seconds),
+            _digits(row.exact_seconds),
+        )
+    return table
+
+
+def _rules(rows: Sequence[BoundsOfCandidates]) -> str:
+    rules = {(row.candidates, "" if row.candidates == "paper" else f"{row.name}, "): row.rule for row in rows}
+    return "\n".join(f"{name}{candidates}: {rule}" for (candidates, name), rule in rules.items())
 
 
 def session_table(session: SessionTimes, degree_seconds: float | None) -> Table:
@@ -56,15 +106,13 @@ def session_table(session: SessionTimes, degree_seconds: float | None) -> Table:
     table = _table(
         title, "", "× GTSAM", "× best from scratch", "all, s", "once, s", "an action, ms",
         caption=f"First answer in this process {session.first_answer:.1f} s.{by_degrees} "
-        f"All ways to log det I agree to {session.largest_deviation:.0e}.",
+        f"All ways to log det I and to E agree to {session.largest_deviation:.0e}.",
     )  # fmt: skip
-    gtsam, best = session.gtsam, session.best_from_scratch
     for method in session.methods:
         name = f"this engine: {method.name}" if method.kind == "engine" else method.name
         table.add_row(
             f"{name} ({method.note})" if method.note else name,
-            _times(ratio(gtsam and gtsam.total, method.total)),
-            _times(ratio(best and best.total, method.total)),
+            *(_times(value) for value in session.ratios(method)),
             _digits(method.total),
             _digits(method.once),
             _digits(1e3 * method.per_action),
@@ -77,7 +125,7 @@ def _table(title: str, *columns: str, caption: str | None = None) -> Table:
         box=box.SIMPLE_HEAD, title=title, title_justify="left", caption=caption, caption_justify="left", pad_edge=False
     )
     for number, column in enumerate(columns):
-        table.add_column(column, justify="left" if number == 0 or column in ("family", "bounds") else "right")
+        table.add_column(column, justify="left" if number == 0 or column in ("family", "bounds", "candidates") else "right")
     return table
 
 
