@@ -22,6 +22,7 @@ SMALLEST = ReproductionPlan(
     num_length_paths=4,
     error_maps=("S2",),
     num_error_seeds=1,
+    num_real_error_seeds=1,
     num_error_paths=4,
 )
 

@@ -107,3 +107,6 @@ def test_claims_hold_where_every_decision_has_it_so() -> None:
     again = [replace(each, seed=1) for each in (ROW, replace(other, error_correlation=0.95))]
     (_, _, ranks) = choice_claims([ROW, other, *again])
     assert (ranks.holding, ranks.cases, ranks.holds) == (1, 2, False)
+    ties = [replace(each, error_correlation=math.nan) for each in (ROW, other)]
+    (_, _, ranks) = choice_claims([ROW, ties[1], *ties])
+    assert (ranks.holding, ranks.cases) == (1, 1)  # where all candidates are equally good, there is nothing to rank

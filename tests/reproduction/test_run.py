@@ -81,7 +81,7 @@ def test_a_part_that_fails_is_named_and_tried_again(tmp_path: Path) -> None:
         (tmp_path / "out" / "journal.jsonl").read_text().replace('"files": {}', f'"files": {files_of(plan)}')
     )
     for _ in range(2):
-        with pytest.raises(UnfinishedRunError, match=r"got 2 that failed, the first with FileError: .*x\.g2o"):
+        with pytest.raises(UnfinishedRunError, match=r"got 3 that failed, the first with FileError: .*x\.g2o"):
             reproduce(plan, tmp_path / "out", InProcess())
 
 

@@ -29,8 +29,8 @@ def reproduce(
 ) -> None:
     """Run the experiments of the paper, say for each claim whether it holds, and write one report.
 
-    Killed at any moment, the same command continues where it stopped. Some two minutes with --quick, about half an hour without, on
-    two cores with nothing else to do. Needs the extras fast, gtsam and page.
+    Killed at any moment, the same command continues where it stopped. Some two minutes with --quick, about half an hour
+    without, on two cores with nothing else to do. Needs the extras fast, gtsam and page.
     """
     from topobelief.cli.console import Reporter
     from topobelief.cli.extras import require_extras

@@ -18,7 +18,7 @@ from topobelief.reproduction.planning_sessions import NOISES
 def draw_choices(rows: Sequence[ChoiceRow]) -> Figure:
     """Loss and rank correlation by way to choose, noise, detour and kind of closures; all places together."""
     with style.style():
-        grid = Grid(len(CLOSURES), 2 * len(DETOURS), width=1.8, height=1.85, left=1.65, across=0.3, down=0.8, bottom=1.05)
+        grid = Grid(len(CLOSURES), 2 * len(DETOURS), width=1.8, height=1.85, left=1.65, across=0.3, down=0.8, bottom=0.95)
         for line, kind in enumerate(CLOSURES):
             for column, detour in enumerate(DETOURS):
                 chosen = [row for row in rows if (row.max_detour, row.closures) == (detour, kind)]

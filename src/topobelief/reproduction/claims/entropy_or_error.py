@@ -31,20 +31,19 @@ def _loss(place: str, name: str, rows: Sequence[ChoiceRow]) -> Claim:
         BEYOND,
         place,
         [share <= NEGLIGIBLE for share in shares],
-        f"lost: mean {100 * statistics.mean(shares):.2g} %, at most {100 * max(shares):.2g} %; "
-        f"{statistics.mean(centimetres):.2g} and {max(centimetres):.2g} cm",
+        f"lost: mean {100 * statistics.mean(shares):.2f} %, at most {100 * max(shares):.1f} %; "
+        f"{statistics.mean(centimetres):.2f} and {max(centimetres):.1f} cm",
         f"at most {100 * NEGLIGIBLE:g} % more than the best action, in every decision",
         "",
     )
 
 
 def _ranks(place: str, rows: Sequence[ChoiceRow]) -> Claim:
-    ranked = {
-        name: [row.error_correlation for row in rows if row.chooser == name and not math.isnan(row.error_correlation)]
-        for name in _SYMBOLS
-    }
-    pairs = list(zip(*ranked.values(), strict=True))
-    medians = [statistics.median(values) if values else math.nan for values in ranked.values()]
+    both = zip(*([row.error_correlation for row in rows if row.chooser == name] for name in _SYMBOLS), strict=True)
+    pairs = [  # where E differs at all; a signature that is the same for all actions ranks none
+        tuple(0.0 if math.isnan(each) else each for each in pair) for pair in both if not all(map(math.isnan, pair))
+    ]
+    medians = [statistics.median(values) for values in zip(*pairs, strict=True)] or [math.nan, math.nan]
     return claim_of_seeds(
         "entropy or error",
         "s_R ranks the actions by expected error at least as well as s_map",
