@@ -119,6 +119,7 @@ def test_an_interrupted_run_can_be_resumed(topobelief, room, tmp_path, monkeypat
     [
         (["ofice"], "expected a scenario of office, lab, corridors"),
         (["office", "--strategy", "best"], "expected a strategy of spanning_trees"),
+        (["office", "--strategy", ""], "expected a strategy of spanning_trees"),
         (["office", "--closures", "all"], "'all' is not one of"),
         (["office", "--noise", "loud"], "expected noise as"),
         (["office", "--max-detour", "0.5"], "expected a detour limit of at least 1"),
@@ -182,6 +183,13 @@ def test_physical_noise_cannot_be_redrawn(topobelief, room):
     outcome = topobelief(["simulate-compare", str(room), "--noise", "physical"])
     assert outcome.code == 2
     assert "expected injected noise to redraw" in outcome.err
+
+
+def test_what_cannot_be_compared_is_one_line(topobelief, room):
+    outcome = topobelief(["simulate-compare", str(room), "--strategies", "shortest,spanning_trees:entropy"])
+    assert outcome.code == 2
+    assert 'expected objective to be one of "joint"' in outcome.err
+    assert outcome.err.count("\n") == 1
 
 
 def test_a_second_interrupt_is_not_asked_for():

@@ -103,7 +103,7 @@ def simulate(
             reporter.warn(place.caution)
         objective = objective or place.objective
         options = RunOptions(
-            strategy=checked_strategy(strategy) if strategy else place.strategy or default_signature(objective),
+            strategy=checked_strategy(place.strategy or default_signature(objective) if strategy is None else strategy),
             objective=objective,
             seed=seed,
             noise=parse_noise(noise),
@@ -184,8 +184,9 @@ def simulate_compare(
 
         place = scenario_of(scenario)
         objective = objective or place.objective
-        given = (strategies or f"shortest,{place.strategy or default_signature(objective)}").split(",")
-        names = tuple(dict.fromkeys(compared_strategy(name.strip()) for name in given))
+        if strategies is None:
+            strategies = f"shortest,{place.strategy or default_signature(objective)}"
+        names = tuple(dict.fromkeys(compared_strategy(name.strip()) for name in strategies.split(",")))
         task = ComparisonTask(
             scenario=scenario,
             max_detour=max_detour,

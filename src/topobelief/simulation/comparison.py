@@ -221,7 +221,7 @@ class _Seed:
         self._question: Question | None = None
         self._values: FloatArray | None = None
         self._error_before: float | None = None
-        self._driven: dict[int, ComparedRun] = {}  # by candidate, where the first choice led to the goal
+        self._driven: dict[int, ComparedRun] = {}  # by candidate, where the robot decided once
 
     def run(self, name: str) -> ComparedRun:
         """What a strategy comes to."""
