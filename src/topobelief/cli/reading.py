@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from topobelief.io.reading import ReadingOptions
 
 # The readers' own choices, repeated so that help need not load them; a test holds them together.
-Edge2Order = Literal["toro", "isam"]
+Edge2Order = Literal["toro", "isam", "isam_root"]
 
 _READING = "Reading the graph"
 
@@ -34,7 +34,11 @@ RobustAsPlain = Annotated[
 ]
 Edge2OrderOption = Annotated[
     Edge2Order,
-    typer.Option(metavar="NAME", help="Order of information entries in EDGE2 lines: toro or isam.", rich_help_panel=_READING),
+    typer.Option(
+        metavar="NAME",
+        help="Order of information entries in EDGE2 lines: toro, isam, or isam_root (of its square root).",
+        rich_help_panel=_READING,
+    ),
 ]
 Component = Annotated[
     str,

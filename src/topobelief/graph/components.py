@@ -21,11 +21,11 @@ def components(graph: PoseGraph) -> list[PoseGraph]:
     """
     labels = graph.topology.component_labels
     members = [np.flatnonzero(labels == label) for label in range(graph.topology.num_components)]
-    return [_part(graph, nodes) for nodes in sorted(members, key=lambda nodes: (-len(nodes), nodes[0]))]
+    return [part_of(graph, nodes) for nodes in sorted(members, key=lambda nodes: (-len(nodes), nodes[0]))]
 
 
-def _part(graph: PoseGraph, nodes: IntArray) -> PoseGraph:
-    """Some poses and the edges between them."""
+def part_of(graph: PoseGraph, nodes: IntArray) -> PoseGraph:
+    """Whole components, by the indices of their poses in increasing order."""
     inside = np.isin(graph.edges[:, 0], nodes)
     edges = np.searchsorted(nodes, graph.edges[inside])
     fixed = tuple(int(np.searchsorted(nodes, index)) for index in graph.fixed if index in nodes)

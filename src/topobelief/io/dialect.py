@@ -55,6 +55,10 @@ class Dialect:
         Orders of an edge's information by name, each with its entries for every tangent dimension. The first is the default.
     refused
         Tags that the format knows and this reader does not, and why.
+    aliases
+        Other tags for the same lines, each with the tag in `tags` that it stands for.
+    roots
+        Those of the orders in which a line holds the upper triangle R of a square root of its information, R^T R.
     """
 
     name: str
@@ -62,6 +66,8 @@ class Dialect:
     marks: re.Pattern[str]
     orders: Mapping[str, Mapping[int, Entries]]
     refused: Mapping[str, str] = field(default_factory=dict[str, str])
+    aliases: Mapping[str, str] = field(default_factory=dict[str, str])
+    roots: frozenset[str] = frozenset()
 
 
 def upper_triangle(size: int) -> Entries:

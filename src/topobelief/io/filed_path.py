@@ -36,14 +36,26 @@ def path_of_quaternions(path: StrPath, rows: Sequence[Sequence[float]], lines: S
         Names the line of a quaternion whose length is not 1.
     """
     numbers = np.array(rows, dtype=np.float64)
-    lengths = np.linalg.norm(numbers[:, 2:], axis=1)
+    headings = headings_of_quaternions(unit_quaternions(path, numbers[:, 2:], lines))
+    return FiledPath(np.column_stack([numbers[:, :2], headings]), tuple(lines))
+
+
+def unit_quaternions(path: StrPath, quaternions: FloatArray, lines: Sequence[int]) -> FloatArray:
+    """Quaternions of shape (N, 4), normalised.
+
+    Raises
+    ------
+    FileError
+        Names the line of a quaternion whose length is not 1.
+    """
+    with np.errstate(over="ignore"):
+        lengths = np.linalg.norm(quaternions, axis=1)
     bad = np.flatnonzero(~(np.abs(lengths - 1) <= _UNIT_TOLERANCE))
     if bad.size:
         first, length = int(bad[0]), float(lengths[bad[0]])
         advice = "; give 0 0 0 1 where the heading does not matter" if length == 0 else ""
         raise FileError(path, f"expected a quaternion of length 1, got one of {length:.4g}{advice}", line=lines[first])
-    headings = headings_of_quaternions(numbers[:, 2:] / lengths[:, None])
-    return FiledPath(np.column_stack([numbers[:, :2], headings]), tuple(lines))
+    return quaternions / lengths[:, None]
 
 
 def numbered_lines(text: str) -> Iterator[tuple[int, str]]:

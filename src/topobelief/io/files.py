@@ -48,6 +48,21 @@ def read_text(path: StrPath, *, any_encoding: bool = False) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
+def read_head(path: StrPath, size: int = 65536) -> bytes:
+    """The first bytes of a file, which show what it is.
+
+    Raises
+    ------
+    FileError
+        If the file is missing, a directory or not readable.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            return file.read(size)
+    except OSError as error:
+        raise FileError(path, _reason(error, "a file to read")) from None
+
+
 @contextmanager
 def atomic_file(path: StrPath) -> Generator[Path]:
     """A temporary path beside `path` to write to; it becomes `path` when the block ends, and vanishes if it fails.

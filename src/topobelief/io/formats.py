@@ -2,18 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Unpack
 
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.io.files import StrPath
+from topobelief.io.boost_archive import is_boost_archive, refuse_boost_archive
+from topobelief.io.files import StrPath, read_head
 from topobelief.io.g2o import G2O
 from topobelief.io.graph_lines import read_lines
+from topobelief.io.markers import is_markers, read_markers
 from topobelief.io.reading import ReadGraph, ReadingKeywords, ReadingOptions
+from topobelief.io.rtabmap import is_database, read_rtabmap
 from topobelief.io.toro import TORO
+from topobelief.io.trajectory import is_trajectory, read_trajectory
+
+_BY_HEAD: tuple[tuple[Callable[[bytes], bool], Callable[[StrPath, ReadingOptions], ReadGraph]], ...] = (
+    (is_database, read_rtabmap),
+    (is_boost_archive, refuse_boost_archive),
+    (is_markers, read_markers),
+    (is_trajectory, read_trajectory),
+)
 
 
 def read_pose_graph(path: StrPath, **options: Unpack[ReadingKeywords]) -> PoseGraph:
-    """Read a pose graph in g2o or TORO format; the first line of a graph shows which; the name of the file does not matter.
+    """Read a pose graph in whatever format its content shows; the name of the file does not matter.
+
+    Formats: g2o; TORO, also as iSAM writes it; databases of RTAB-Map; trajectories in TUM or KITTI format, for which `noise`
+    has to be stated; and the graph that slam_toolbox or Cartographer draws, a visualization_msgs/MarkerArray as
+    `ros2 topic echo` prints it.
 
     Parameters
     ----------
@@ -35,4 +51,6 @@ def read_pose_graph(path: StrPath, **options: Unpack[ReadingKeywords]) -> PoseGr
 
 def read_graph_file(path: StrPath, options: ReadingOptions) -> ReadGraph:
     """As `read_pose_graph`, with what was dropped or assumed as notes in place of warnings."""
-    return read_lines(path, (G2O, TORO), options)
+    head = read_head(path)
+    reader = next((reader for recognises, reader in _BY_HEAD if recognises(head)), None)
+    return read_lines(path, (G2O, TORO), options) if reader is None else reader(path, options)

@@ -13,18 +13,17 @@ import numpy as np
 
 from topobelief.arrays import BoolArray, FloatArray, IntArray
 from topobelief.errors import DisconnectedGraphError, FileError, InvalidGraphError
-from topobelief.geometry import SE3_GROUP, Group
+from topobelief.geometry import Group
 from topobelief.graph.dead_reckoning import dead_reckoned_poses
 from topobelief.graph.information import positive_definite
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.graph.projection import projected_to_plane
-from topobelief.graph.topology import Topology
 from topobelief.io.dialect import Dialect, Tag
 from topobelief.io.files import StrPath, read_text
 from topobelief.io.foreign_lines import ForeignLines
+from topobelief.io.part import in_plane, wanted_component
 from topobelief.io.reading import ReadGraph, ReadingOptions, by_option
 from topobelief.io.robust_edges import SWITCHES, plain_edges
-from topobelief.symbols import find_node, node_name
+from topobelief.symbols import node_name
 
 _ID_LIMIT = 2**63  # ids are kept as signed 64-bit integers
 _QUATERNION_NORMS = (1e-6, 1e6)  # what rounding and carelessness leave of a unit quaternion
@@ -99,7 +98,9 @@ class _Reader:
 
         information, definite = self._definite(edge_values[:, size:])
         ids = np.unique(np.concatenate([vertex_ids.ravel(), edge_ids[definite].ravel()]))
-        ids = ids[self._in_component(ids, edge_ids[definite])]
+        inside, kept_notes = wanted_component(self.path, ids, np.searchsorted(ids, edge_ids[definite]), self.options.component)
+        self.notes += kept_notes
+        ids = ids[inside]
         kept, given = definite & np.isin(edge_ids[:, 0], ids), np.isin(vertex_ids[:, 0], ids)
         edges, known = np.searchsorted(ids, edge_ids[kept]), np.searchsorted(ids, vertex_ids[given, 0])
         measurements = self.group.normalized(edge_values[kept, :size])
@@ -107,12 +108,10 @@ class _Reader:
         fixed = self._fixed(named, ids)
         try:
             graph = PoseGraph(poses, edges, measurements, information[kept], ids=ids, fixed=fixed)
-            if self.options.planar and graph.tangent_dim == SE3_GROUP.tangent_dim:
-                graph, note = projected_to_plane(graph)
-                self.notes.append(note)
         except InvalidGraphError as error:
             raise FileError(self.path, str(error)) from None
-        return ReadGraph(graph, tuple(self.notes))
+        graph, dropped = in_plane(self.path, graph, self.options)
+        return ReadGraph(graph, (*self.notes, *dropped))
 
     def _dialect(self, dialects: Sequence[Dialect]) -> tuple[Dialect, str]:
         """The format of the first line that shows one, and the tags that are expected."""
@@ -134,7 +133,7 @@ class _Reader:
             if not fields:
                 continue
             tag = fields.pop(0)
-            table = tables.get(tag)
+            table = tables.get(self.dialect.aliases.get(tag, tag))
             if table is None and tag != "FIX":
                 skipped = tag.startswith("PARAMS_") or (self.rewritten and tag in SWITCHES)
                 if not skipped and not self.foreign.take(tag, number, fields):
@@ -251,9 +250,13 @@ class _Reader:
         """Information matrices whose entries stand in the named order."""
         kappa = self.group.tangent_dim
         rows, columns = self.dialect.orders[order][kappa]
-        information = np.empty((len(entries), kappa, kappa))
-        information[:, rows, columns] = information[:, columns, rows] = entries
-        return information
+        matrices = np.zeros((len(entries), kappa, kappa))
+        matrices[:, rows, columns] = entries
+        if order in self.dialect.roots:
+            with np.errstate(over="ignore"):
+                return matrices.mT @ matrices
+        matrices[:, columns, rows] = entries
+        return matrices
 
     def _definite(self, entries: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Information matrices, and which of them are positive definite; others are refused unless they may be dropped."""
@@ -271,35 +274,16 @@ class _Reader:
             f"got eigenvalues from {spectrum[0]:.3g} to {spectrum[-1]:.3g}"
         )
         for other in orders:
-            if positive_definite(self._information(entries, other)).all():
+            if other not in self.dialect.roots and positive_definite(self._information(entries, other)).all():
                 advice = f'--edge2-order {other} (in Python edge2_order="{other}")'
                 message += f"; in the other order of {self.edges.tag} all edges have one: read the file with {advice}"
+                message += "".join(f", or {root} where they are square roots" for root in self.dialect.roots)
                 raise FileError(self.path, message, line=line)
         many = f"{wrong.size} of {len(definite)} edges, whose information is not positive definite"
         if "indefinite" not in self.options.drop:
             raise FileError(self.path, f"{message}; leave out {many}, with {by_option('indefinite')}", line=line)
         self.notes.append(f"dropped {many} (the first on line {line})")
         return information, definite
-
-    def _in_component(self, ids: IntArray, edge_ids: IntArray) -> BoolArray:
-        """Which poses are in the part of the graph that is asked for."""
-        wanted = self.options.component
-        topology = Topology(len(ids), np.searchsorted(ids, edge_ids))
-        labels = topology.component_labels
-        if wanted == "all":
-            return np.ones(len(ids), dtype=np.bool_)
-        if wanted == "largest":
-            member = int(np.argmax(np.bincount(labels)[labels]))
-        elif (found := find_node(ids.tolist(), wanted)) is not None:
-            member = found
-        else:
-            raise FileError(self.path, f'expected component to be "all", "largest" or the id of a pose, got {wanted!r}')
-        inside = labels == labels[member]
-        if not inside.all():
-            first, last = (node_name(int(ids[index])) for index in np.flatnonzero(inside)[[0, -1]])
-            kept = f"{np.count_nonzero(inside)} of {len(ids)} poses ({first} … {last})"
-            self.notes.append(f"kept one of {topology.num_components} components: {kept}")
-        return inside
 
     def _placed(
         self, ids: IntArray, edges: IntArray, measurements: FloatArray, known: IntArray, known_poses: FloatArray

@@ -1,9 +1,10 @@
-"""The TORO text format in 2D: VERTEX2, EDGE2 (openslam-org.github.io/toro).
+"""The TORO text format in 2D: VERTEX2, EDGE2 (openslam-org.github.io/toro), and the same lines as iSAM writes them.
 
     VERTEX2 id x y theta
     EDGE2 i j x y theta I11 I12 I22 I33 I13 I23
 
-Note the order of the information; iSAM writes EDGE2 with I11 I12 I13 I22 I23 I33, which is an option. TORO files in 3D
+Note the order of the information. Files in the style of iSAM have EDGE2, ODOMETRY or Constraint2 with I11 I12 I13 I22 I23 I33,
+and iSAM itself takes these six for a square root of the information; both are options. TORO files in 3D
 (VERTEX3, EDGE3) are refused: programs disagree whether their information is per Euler angle or per rotation vector, and a guess
 would silently change every weight.
 """
@@ -28,11 +29,14 @@ _SPACE = (
 TORO = Dialect(
     name="TORO",
     tags={"VERTEX2": Tag("vertex", SE2_GROUP), "EDGE2": Tag("edge", SE2_GROUP)},
-    marks=re.compile(r"(VERTEX|EDGE)[23]|EQUIV|LANDMARK|BR"),
+    marks=re.compile(r"(VERTEX|EDGE)[23]|EQUIV|LANDMARK|BR|ODOMETRY|Constraint2"),
     orders={
         "toro": {SE2_GROUP.tangent_dim: (np.array([0, 0, 1, 2, 0, 1]), np.array([0, 1, 1, 2, 2, 2]))},
         "isam": {SE2_GROUP.tangent_dim: upper_triangle(SE2_GROUP.tangent_dim)},
+        "isam_root": {SE2_GROUP.tangent_dim: upper_triangle(SE2_GROUP.tangent_dim)},
     },
+    aliases={"ODOMETRY": "EDGE2", "Constraint2": "EDGE2"},
+    roots=frozenset({"isam_root"}),
     refused={
         "VERTEX3": _SPACE,
         "EDGE3": _SPACE,
@@ -54,8 +58,9 @@ def read_toro(path: StrPath, **options: Unpack[ReadingKeywords]) -> PoseGraph:
     path
         The file. Metres and radians.
     **options
-        As for `topobelief.read_g2o`; `edge2_order="isam"` takes the information for the upper triangle row by row, as iSAM
-        writes EDGE2, and `drop="equiv"` ignores EQUIV lines.
+        As for `topobelief.read_g2o`; `edge2_order="isam"` takes the information for the upper triangle row by row,
+        `edge2_order="isam_root"` for that of its square root R, as iSAM does (information R^T R), and `drop="equiv"` ignores
+        EQUIV lines.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Paths in the TUM format of trajectories: `timestamp x y z qx qy qz qw` a line, separated by blanks; # begins a comment."""
+"""The TUM format of trajectories and paths: `timestamp x y z qx qy qz qw` a line, separated by blanks; # begins a comment."""
 
 from __future__ import annotations
 
@@ -21,20 +21,33 @@ def read_tum_path(path: StrPath) -> FiledPath:
     FileError
         Names the line that is not what it should be.
     """
+    rows, lines = tum_rows(path)
+    return path_of_quaternions(path, rows[:, [1, 2, 4, 5, 6, 7]].tolist(), lines)
+
+
+def tum_rows(path: StrPath) -> tuple[FloatArray, list[int]]:
+    """The rows of a file in TUM format, shape (N, 8), N > 0, and their lines.
+
+    Raises
+    ------
+    FileError
+        Names the line that is not eight finite numbers.
+    """
     rows: list[list[float]] = []
     lines: list[int] = []
     for number, line in numbered_lines(read_text(path)):
-        _, x, y, _, *quaternion = finite_numbers(path, number, line.split(), _COLUMNS)
-        rows.append([x, y, *quaternion])
+        rows.append(finite_numbers(path, number, line.split(), _COLUMNS))
         lines.append(number)
     if not rows:
         raise FileError(path, f"expected at least one pose {_COLUMNS}, got none")
-    return path_of_quaternions(path, rows, lines)
+    return np.array(rows), lines
 
 
 def tum_of_path(poses: FloatArray) -> str:
-    """The text of a TUM file of poses of shape (N, 3), at height 0; a path has no times, so they count poses."""
-    count = np.arange(len(poses))
-    numbers = np.column_stack([poses[:, :2], 0.0 * count, quaternions_of_headings(poses[:, 2])])
-    rows: list[list[float]] = numbers.tolist()
+    """The text of a TUM file of poses of shape (N, 3), at height 0, or (N, 7); they have no times, so these count poses."""
+    rows: list[list[float]] = (poses if poses.shape[1] == 7 else _upright(poses)).tolist()
     return f"# {_COLUMNS}\n" + "".join(f"{time} {' '.join(map(str, row))}\n" for time, row in enumerate(rows))
+
+
+def _upright(poses: FloatArray) -> FloatArray:
+    return np.column_stack([poses[:, :2], np.zeros(len(poses)), quaternions_of_headings(poses[:, 2])])
