@@ -28,12 +28,14 @@ from .io.floor_plan import read_world as read_world
 from .io.formats import read_pose_graph as read_pose_graph
 from .io.g2o import read_g2o as read_g2o
 from .io.g2o import write_g2o as write_g2o
+from .io.graph_formats import write_pose_graph as write_pose_graph
 from .io.path_formats import read_path as read_path
 from .io.path_formats import write_path as write_path
 from .io.reading import ReadingOptions as ReadingOptions
 from .io.ros_map import read_ros_map as read_ros_map
 from .io.ros_map import write_ros_map as write_ros_map
 from .io.toro import read_toro as read_toro
+from .io.toro import write_toro as write_toro
 from .planning.decision import Decision as Decision
 from .planning.decision_quality import DecisionQuality as DecisionQuality
 from .planning.decision_quality import decision_quality as decision_quality

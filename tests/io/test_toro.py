@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from data_files import data_file
-from topobelief.errors import FileError, ReadingWarning
+from topobelief.errors import FileError, InvalidInputError, ReadingWarning
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.io.formats import read_pose_graph
 from topobelief.io.g2o import read_g2o
-from topobelief.io.toro import read_toro
+from topobelief.io.toro import read_toro, write_toro
 
 PAIR = "VERTEX2 0 0 0 0\nVERTEX2 1 1 2 0.5\n"
 
@@ -87,3 +89,44 @@ def test_equiv_lines_can_be_ignored(filed):
     with pytest.warns(ReadingWarning, match=r"dropped pairs of poses that are to be merged into one: EQUIV on line 4"):
         graph = read_toro(filed(PAIR + "EDGE2 0 1 1 2 0.5 1 0 1 1 0 0\nEQUIV 0 1\n"), drop="equiv")
     assert graph.num_edges == 1
+
+
+@pytest.mark.parametrize("tag", ["EDGE2", "ODOMETRY", "Constraint2"])
+def test_isam_states_a_square_root_of_the_information(tag: str, filed):
+    """R11 R12 R13 R22 R23 R33 of an upper triangular R; the information is R^T R."""
+    path = filed(f"{tag} 0 1 1 0 0.5 10 2 3 20 4 5\n{tag} 1 2 1 0 0 10 0 0 20 0 5\n")
+    root = np.array([[10, 2, 3], [0, 20, 4], [0, 0, 5]])
+    graph = read_toro(path, edge2_order="isam_root")
+    assert graph.information[0].tolist() == (root.T @ root).tolist()
+    np.testing.assert_allclose(graph.poses[1], [1, 0, 0.5])
+    assert read_pose_graph(path, edge2_order="isam").information[0].tolist() == [[10, 2, 3], [2, 20, 4], [3, 4, 5]]
+
+
+def test_the_other_order_and_its_square_root_are_offered(filed):
+    with pytest.raises(FileError, match=r'edge2_order="isam"\), or isam_root where they are square roots'):
+        read_toro(filed("EDGE2 0 1 1 0 0.5 3.16 0 0 3.16 0 5\n"))
+
+
+def test_what_is_written_is_read_to_the_last_bit(tmp_path: Path):
+    rng = np.random.default_rng(1)
+    root = rng.normal(size=(2, 3, 3))
+    graph = PoseGraph(
+        rng.normal(size=(3, 3)),
+        [(2, 0), (0, 1)],
+        rng.normal(size=(2, 3)),
+        root.mT @ root + np.eye(3),
+        ids=[4, 7, 2**62],
+        fixed=(1,),
+    )
+    write_toro(graph, tmp_path / "graph.toro")
+    back = read_pose_graph(tmp_path / "graph.toro")
+    for name in ("poses", "edges", "measurements", "information", "ids"):
+        assert np.array_equal(getattr(back, name), getattr(graph, name)), name
+    assert back.fixed == (1,)
+
+
+def test_space_has_no_lines_in_toro(tmp_path: Path):
+    graph = PoseGraph([[0, 0, 0, 0, 0, 0, 1]], np.zeros((0, 2), int), None, np.eye(6))
+    with pytest.raises(InvalidInputError, match=r"expected a graph in SE\(2\) for a TORO file, got one in SE\(3\); write g2o"):
+        write_toro(graph, tmp_path / "graph.toro")
+    assert not (tmp_path / "graph.toro").exists()

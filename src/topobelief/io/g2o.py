@@ -16,12 +16,12 @@ from __future__ import annotations
 import re
 from typing import Unpack
 
-from topobelief.errors import InvalidInputError
 from topobelief.geometry import SE2_GROUP, SE3_GROUP
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.dialect import Dialect, Tag, upper_triangle
 from topobelief.io.files import StrPath, write_text
 from topobelief.io.graph_lines import read_lines
+from topobelief.io.graph_text import graph_text
 from topobelief.io.reading import ReadingKeywords, ReadingOptions
 
 _OFFSET = "it measures between sensors that sit off the poses; convert it to an edge between the poses"
@@ -91,23 +91,4 @@ def write_g2o(graph: PoseGraph, path: StrPath) -> None:
     InvalidInputError
         If an id is negative, which `read_g2o` would refuse.
     """
-    if graph.ids.min() < 0:
-        raise InvalidInputError(f"expected ids from 0 to 2^63 - 1 for a file, got {graph.ids.min()}; renumber the poses")
-    vertex, edge = (tag for tag, meaning in G2O.tags.items() if meaning.group is graph.group)
-    rows, columns = upper_triangle(graph.tangent_dim)
-    lines = [f"{vertex} {name} {_joined(pose)}" for name, pose in zip(graph.ids.tolist(), graph.poses.tolist(), strict=True)]
-    lines += [f"FIX {graph.ids[index]}" for index in graph.fixed]
-    lines += [
-        f"{edge} {i} {j} {_joined(measured)} {_joined(entries)}"
-        for (i, j), measured, entries in zip(
-            graph.ids[graph.edges].tolist(),
-            graph.measurements.tolist(),
-            graph.information[:, rows, columns].tolist(),
-            strict=True,
-        )
-    ]
-    write_text(path, "\n".join(lines) + "\n")
-
-
-def _joined(numbers: list[float]) -> str:
-    return " ".join(map(repr, numbers))
+    write_text(path, graph_text(graph, G2O))

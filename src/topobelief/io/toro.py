@@ -19,8 +19,9 @@ import numpy as np
 from topobelief.geometry import SE2_GROUP
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.dialect import Dialect, Tag, upper_triangle
-from topobelief.io.files import StrPath
+from topobelief.io.files import StrPath, write_text
 from topobelief.io.graph_lines import read_lines
+from topobelief.io.graph_text import graph_text
 from topobelief.io.reading import ReadingKeywords, ReadingOptions
 
 _SPACE = (
@@ -70,3 +71,16 @@ def read_toro(path: StrPath, **options: Unpack[ReadingKeywords]) -> PoseGraph:
         If poses without a VERTEX2 line are connected to none that has one; names some of them.
     """
     return read_lines(path, (TORO,), ReadingOptions(**options)).warned()
+
+
+def write_toro(graph: PoseGraph, path: StrPath) -> None:
+    """Write a planar pose graph as a TORO file; whole or not at all. Doubles, ids, order of edges and FIX lines are kept.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be written.
+    InvalidInputError
+        If the graph is in SE(3), or an id is negative, which `read_toro` would refuse.
+    """
+    write_text(path, graph_text(graph, TORO))

@@ -1,0 +1,79 @@
+"""`topobelief convert`: a pose graph from any format that is read to any that is written."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from topobelief.cli import plan_arguments as values
+from topobelief.cli.reading import Component, Drop, Edge2OrderOption, Planar, RobustAsPlain, reading_options
+from topobelief.wording import counted
+
+_UNSTATED = "Files that state no noise: trajectories, and graphs drawn as markers"
+
+
+def convert(
+    source: Annotated[
+        Path,
+        typer.Argument(
+            metavar="IN",
+            help="g2o, TORO, iSAM, RTAB-Map .db, trajectory (TUM or KITTI), or a MarkerArray as `ros2 topic echo` prints it; "
+            "told by content.",
+            show_default=False,
+        ),
+    ],
+    target: Annotated[
+        Path, typer.Argument(metavar="OUT", help=".g2o, .graph or .toro (TORO, 2D), or .tum (poses alone).", show_default=False)
+    ],
+    noise: Annotated[
+        tuple[float, float] | None,
+        typer.Option(
+            metavar="M DEG",
+            help="Standard deviations of each edge, metres and degrees.",
+            show_default=False,
+            rich_help_panel=_UNSTATED,
+        ),
+    ] = None,
+    spacing: Annotated[
+        float,
+        typer.Option(metavar="M", help="Keep a pose of a trajectory every so many metres; 0: all.", rich_help_panel=_UNSTATED),
+    ] = 0.0,
+    closure_radius: Annotated[
+        float | None,
+        typer.Option(
+            metavar="M",
+            help="Close loops of a trajectory between poses as near as this.",
+            show_default="none",
+            rich_help_panel=_UNSTATED,
+            callback=values.above_zero,
+        ),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")] = False,
+    drop: Drop = None,
+    robust_as_plain: RobustAsPlain = False,
+    edge2_order: Edge2OrderOption = "toro",
+    component: Component = "all",
+    planar: Planar = False,
+) -> None:
+    """Convert a pose graph to another format, from whatever it is read from."""
+    from topobelief.cli.console import Reporter
+
+    reporter = Reporter(as_json=as_json)
+    with reporter.stage("start-up"):
+        from topobelief.cli.prior import read_filed
+        from topobelief.io.graph_formats import keeps_edges, require_graph_suffix, write_pose_graph
+    require_graph_suffix(target)
+    stated = reading_options(drop, robust_as_plain=robust_as_plain, edge2_order=edge2_order, component=component, planar=planar)
+    deviations = None if noise is None else (noise[0], math.radians(noise[1]))
+    reading = replace(stated, noise=deviations, spacing=spacing, closure_radius=closure_radius)
+    graph = read_filed(source, reporter, reading=reading)
+    if not keeps_edges(target):
+        reporter.note(f"{target}: holds the poses alone; edges, their information and ids are not written")
+    write_pose_graph(graph, target)
+    reporter.say(f"{target}: {graph.group.name}, {counted(graph.num_poses, 'pose')}, {counted(graph.num_edges, 'edge')}.")
+    size = {"space": graph.group.name, "num_poses": graph.num_poses, "num_edges": graph.num_edges}
+    reporter.answer({"file": str(target), **size, "notes": reporter.notes})

@@ -1,0 +1,42 @@
+"""Pose graphs as lines of text in a dialect, written so that reading returns every double to the last bit."""
+
+from __future__ import annotations
+
+from topobelief.errors import InvalidInputError
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.io.dialect import Dialect
+
+
+def graph_text(graph: PoseGraph, dialect: Dialect) -> str:
+    """Lines of vertices, FIX and edges, in the dialect's first order of the information.
+
+    Raises
+    ------
+    InvalidInputError
+        If the dialect has no lines for the graph's group, or an id is negative, which its reader would refuse.
+    """
+    tags = [tag for tag, meaning in dialect.tags.items() if meaning.group is graph.group]
+    if not tags:
+        raise InvalidInputError(
+            f"expected a graph in SE(2) for a {dialect.name} file, got one in {graph.group.name}; write g2o"
+        )
+    if graph.ids.min() < 0:
+        raise InvalidInputError(f"expected ids from 0 to 2^63 - 1 for a file, got {graph.ids.min()}; renumber the poses")
+    vertex, edge = tags
+    rows, columns = next(iter(dialect.orders.values()))[graph.tangent_dim]
+    lines = [f"{vertex} {name} {_joined(pose)}" for name, pose in zip(graph.ids.tolist(), graph.poses.tolist(), strict=True)]
+    lines += [f"FIX {graph.ids[index]}" for index in graph.fixed]
+    lines += [
+        f"{edge} {i} {j} {_joined(measured)} {_joined(entries)}"
+        for (i, j), measured, entries in zip(
+            graph.ids[graph.edges].tolist(),
+            graph.measurements.tolist(),
+            graph.information[:, rows, columns].tolist(),
+            strict=True,
+        )
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _joined(numbers: list[float]) -> str:
+    return " ".join(map(repr, numbers))
