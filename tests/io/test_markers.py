@@ -2,53 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from door_files import LIST, SPHERE, STRIP, cartographer, marker, message, slam_toolbox
 from topobelief.errors import FileError
 from topobelief.io.formats import read_graph_file
 from topobelief.io.reading import ReadGraph, ReadingOptions
-
-Point = tuple[float, ...]
-SPHERE, STRIP, LIST = 2, 4, 5
-
-
-def marker(
-    namespace: str, number: int, kind: int, points: Sequence[Point] = (), *, at: Point = (0, 0, 0), action: int = 0
-) -> str:
-    """One marker, as ROS 2 prints it."""
-    x, y, z = (*at, 0.0)[:3]
-    lines = [
-        "- header:\n    stamp:\n      sec: 12\n      nanosec: 5\n    frame_id: map",
-        f"  ns: {namespace}\n  id: {number}\n  type: {kind}\n  action: {action}",
-        f"  pose:\n    position:\n      x: {x}\n      y: {y}\n      z: {z}",
-        "    orientation:\n      x: 0.0\n      y: 0.0\n      z: 0.0\n      w: 1.0",
-        "  scale:\n    x: 0.1\n    y: 0.1\n    z: 0.1\n  points:" + ("" if points else " []"),
-    ]
-    lines += [f"  - x: {x}\n    y: {y}\n    z: {(*rest, 0.0)[0]}" for x, y, *rest in points]
-    return "\n".join([*lines, "  colors: []\n  text: ''\n  mesh_use_embedded_materials: false"]) + "\n"
-
-
-def message(*markers: str) -> str:
-    return "markers:\n" + "".join(markers) + "---\n"
 
 
 def read(text: str, tmp_path: Path, options: ReadingOptions | None = None) -> ReadGraph:
     path = tmp_path / "graph.yaml"
     path.write_text(text)
     return read_graph_file(path, options or ReadingOptions())
-
-
-def slam_toolbox() -> str:
-    """A square of four poses as slam_toolbox draws it: what was there is cleared, then spheres and one list of lines."""
-    corners = [(0.0, 0.0), (2.5, 0.0), (2.5, 2.5), (0.0, 2.5)]
-    spheres = [marker("slam_toolbox", number, SPHERE, at=corner) for number, corner in enumerate(corners)]
-    ends = [corners[index] for pair in ((0, 1), (1, 2), (2, 3), (0, 3)) for index in pair]
-    lines = [marker("slam_toolbox_edges", 0, LIST, ends), marker("slam_toolbox_edges", 1, LIST)]
-    return message(marker("''", 0, 0, action=3), *spheres, *lines)
 
 
 def test_the_graph_of_slam_toolbox_is_read(tmp_path: Path):
@@ -87,22 +55,6 @@ def test_the_last_state_of_a_marker_counts(tmp_path: Path):
     graph, _ = read(first + second, tmp_path)
     assert graph.poses[:, :2].tolist() == [[0, 0], [1, 0]]
     assert graph.num_edges == 1
-
-
-def cartographer() -> tuple[str, str]:
-    """Three poses of a trajectory and two submaps; the residual of the last constraint leads from where it ends to its pose."""
-    poses = [(0.0, 0.0), (1.0, 0.0), (2.0, 0.1)]
-    trajectory = message(marker("Trajectory 0", 0, STRIP, poses))
-    submaps = [(0.5, 0.5), (1.5, 0.5)]
-    intra = [submaps[0], poses[0], submaps[0], poses[1], submaps[1], poses[1], submaps[1], poses[2]]
-    missed = (2.0, 0.3)
-    constraints = message(
-        marker("Intra constraints", 0, LIST, intra),
-        marker("Intra residuals", 1, LIST, [poses[0], poses[0]], at=(0, 0, 0.1)),
-        marker('"Inter constraints, same trajectory"', 2, LIST, [submaps[0], missed], at=(0, 0, 0.1)),
-        marker('"Inter residuals, same trajectory"', 3, LIST, [missed, poses[2]], at=(0, 0, 0.1)),
-    )
-    return trajectory, constraints
 
 
 def test_the_two_topics_of_cartographer_are_read_from_one_file(tmp_path: Path):

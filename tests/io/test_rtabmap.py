@@ -1,4 +1,4 @@
-"""Databases of RTAB-Map, written here by its published schema (version 0.22)."""
+"""Databases of RTAB-Map, which `door_files` writes by its published schema."""
 
 from __future__ import annotations
 
@@ -11,66 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from door_files import INFORMATION, Database, compressed, matrix
 from topobelief.errors import FileError
 from topobelief.geometry import SE3_GROUP
 from topobelief.io.formats import read_graph_file, read_pose_graph
 from topobelief.io.reading import ReadingOptions
-
-SCHEMA = """
-CREATE TABLE Node (id INTEGER NOT NULL, map_id INTEGER NOT NULL, weight INTEGER, stamp FLOAT, pose BLOB, ground_truth_pose BLOB,
-  velocity BLOB, label TEXT, gps BLOB, env_sensors BLOB, time_enter DATE, PRIMARY KEY (id));
-CREATE TABLE Link (from_id INTEGER NOT NULL, to_id INTEGER NOT NULL, type INTEGER NOT NULL, information_matrix BLOB NOT NULL,
-  transform BLOB, user_data BLOB, FOREIGN KEY (from_id) REFERENCES Node(id), FOREIGN KEY (to_id) REFERENCES Node(id));
-CREATE TABLE Admin (version TEXT, preview_image BLOB, opt_cloud BLOB, opt_ids BLOB, opt_poses BLOB, opt_last_localization BLOB,
-  opt_polygons_size INTEGER, opt_polygons BLOB, opt_tex_coords BLOB, opt_tex_materials BLOB, opt_map BLOB, opt_map_x_min FLOAT,
-  opt_map_y_min FLOAT, opt_map_resolution FLOAT, time_enter DATE);
-CREATE INDEX IDX_Link_from_id on Link (from_id);
-INSERT INTO Admin(version) VALUES('0.22.0');
-"""
-INFORMATION = np.diag([100.0, 200, 300, 400, 500, 600])
-INFORMATION[0, 5] = INFORMATION[5, 0] = 7
-
-
-def matrix(x: float, y: float = 0, yaw: float = 0) -> bytes:
-    """The upper three rows of a transform, as floats of 32 bits."""
-    c, s = np.cos(yaw), np.sin(yaw)
-    return np.array([[c, -s, 0, x], [s, c, 0, y], [0, 0, 1, 0.5]], dtype="<f4").tobytes()
-
-
-def inverse(x: float) -> bytes:
-    return np.array([[1, 0, 0, -x], [0, 1, 0, 0], [0, 0, 1, -0.5]], dtype="<f4").tobytes()
-
-
-def compressed(array: np.ndarray) -> bytes:
-    """As RTAB-Map stores an array: zlib, then rows, columns and OpenCV's type."""
-    return zlib.compress(array.tobytes()) + struct.pack("<3i", 1, array.size, {"<i4": 4, "<f4": 5}[array.dtype.str])
-
-
-class Database:
-    """A square of four nodes, each link stored from both ends but for a closure; changed before it is written."""
-
-    def __init__(self) -> None:
-        self.nodes: list[tuple[object, ...]] = [(node, 0, matrix(node - 1)) for node in (1, 2, 3, 4)]
-        self.links: list[tuple[object, ...]] = []
-        for node in (1, 2, 3):
-            self.links.append((node, node + 1, 0, INFORMATION.tobytes(), matrix(1)))
-            self.links.append((node + 1, node, 0, INFORMATION.tobytes(), inverse(1)))
-        self.links.append((4, 1, 1, INFORMATION.tobytes(), matrix(-2.9)))
-        self.admin: tuple[bytes | None, bytes | None] = (None, None)
-        self.schema = SCHEMA
-
-    def optimised(self, *ids: int) -> None:
-        poses = np.concatenate([np.frombuffer(matrix(10 + node, 1, 0.1), dtype="<f4") for node in ids])
-        self.admin = compressed(np.array(ids, dtype="<i4")), compressed(poses)
-
-    def write(self, path: Path) -> Path:
-        with closing(sqlite3.connect(path)) as database, database:
-            database.executescript(self.schema)
-            database.executemany("INSERT INTO Node(id, map_id, pose) VALUES (?, ?, ?)", self.nodes)
-            query = "INSERT INTO Link(from_id, to_id, type, information_matrix, transform) VALUES (?, ?, ?, ?, ?)"
-            database.executemany(query, self.links)
-            database.execute("UPDATE Admin SET opt_ids = ?, opt_poses = ?", self.admin)
-        return path
 
 
 def test_links_are_measurements_and_optimised_poses_are_taken(tmp_path: Path):

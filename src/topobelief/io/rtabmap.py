@@ -82,8 +82,13 @@ def read_rtabmap(path: StrPath, options: ReadingOptions) -> ReadGraph:
         uri = f"file:{quote(str(Path(path).resolve()))}?mode=ro&immutable=1"  # makes no lock and no journal beside it
         with closing(sqlite3.connect(uri, uri=True)) as database:
             return _Database(path, database, options).graph()
-    except sqlite3.Error as error:
-        raise FileError(path, f"expected a database of RTAB-Map, got one that SQLite cannot read: {error}") from None
+    except (sqlite3.Error, UnicodeDecodeError) as error:
+        reason = " ".join(str(error).split())[:200]
+        raise FileError(path, f"expected a database of RTAB-Map, got one that SQLite cannot read: {reason}") from None
+
+
+def _text(content: bytes) -> str:
+    return content.decode(errors="replace")
 
 
 class _Database:
@@ -93,6 +98,7 @@ class _Database:
         self.path, self.options = path, options
         size = Path(path).stat().st_size
         self._database = database
+        database.text_factory = _text
         self._left = _STEPS_PER_BYTE * size // _STEPS + 10
         database.set_progress_handler(self._out_of_steps, _STEPS)
         database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(size, 2**30))
