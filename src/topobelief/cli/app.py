@@ -12,6 +12,7 @@ import typer
 from topobelief.cli.benchmark import benchmark
 from topobelief.cli.command import Command, PlaceCommand
 from topobelief.cli.convert import convert
+from topobelief.cli.datasets import datasets
 from topobelief.cli.info import info
 from topobelief.cli.plan import plan
 from topobelief.cli.reproduce import reproduce
@@ -29,6 +30,7 @@ app = typer.Typer(name="topobelief", pretty_exceptions_enable=False)
 app.command(cls=PlaceCommand)(plan)
 app.command(cls=PlaceCommand)(info)
 app.command(cls=Command)(convert)
+app.command(cls=Command)(datasets)
 app.command(cls=Command)(benchmark)
 app.command(cls=Command)(reproduce)
 app.command(cls=Command)(simulate)
