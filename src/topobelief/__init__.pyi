@@ -10,6 +10,7 @@ from .candidates.propose import CandidateRule as CandidateRule
 from .candidates.propose import propose as propose
 from .candidates.roadmap import Roadmap as Roadmap
 from .candidates.roadmap import build_roadmap as build_roadmap
+from .conversions.gtsam import action_to_gtsam as action_to_gtsam
 from .conversions.gtsam import from_gtsam as from_gtsam
 from .conversions.gtsam import to_gtsam as to_gtsam
 from .entropy import joint_entropy as joint_entropy

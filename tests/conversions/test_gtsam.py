@@ -11,10 +11,13 @@ import pytest
 from hypothesis import given
 
 from graphs import SE2_GROUP, SE3_GROUP, pose_graphs
-from topobelief.conversions.gtsam import from_gtsam, to_gtsam
-from topobelief.errors import InvalidInputError
+from topobelief.conversions.gtsam import action_to_gtsam, from_gtsam, to_gtsam
+from topobelief.entropy import joint_entropy
+from topobelief.errors import InvalidInputError, ReadingWarning
+from topobelief.graph.action import Action, posterior
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.g2o import read_g2o, write_g2o
+from topobelief.planning.planner import Planner
 from topobelief.symbols import node_name
 
 UNIT = gtsam.noiseModel.Unit.Create(3)
@@ -126,10 +129,9 @@ BAD_FACTORS = {
         gtsam.RangeFactorPose2(0, 1, 1.0, gtsam.noiseModel.Unit.Create(1)),
         "got RangeFactorPose2 as factor 0",
     ),
-    "robust": (gtsam.BetweenFactorPose2(0, 1, gtsam.Pose2(), HUBER), "expected Gaussian noise, got Robust on factor 0"),
     "constrained": (
         gtsam.BetweenFactorPose2(0, 1, gtsam.Pose2(), gtsam.noiseModel.Constrained.All(3)),
-        "expected Gaussian noise, got Constrained on factor 0",
+        "expected Gaussian or robust noise, got Constrained on factor 0",
     ),
     "no value": (gtsam.BetweenFactorPose2(0, 9, gtsam.Pose2(), UNIT), "got none for 9 of factor 0"),
     "mixed": (
@@ -158,3 +160,68 @@ def test_values_that_are_no_poses_are_refused():
 def test_negative_ids_are_no_keys():
     with pytest.raises(InvalidInputError, match="expected ids from 0 as GTSAM keys, got -1"):
         to_gtsam(PoseGraph([[0, 0, 0]], [], None, np.eye(3), ids=[-1]))
+
+
+def test_a_robust_factor_is_the_gaussian_of_its_linearisation():
+    """At 2 standard deviations Huber's weight is 1/2; the Hessian is that of GTSAM's own linearisation."""
+    values = _planar_values()
+    noise = gtsam.noiseModel.Diagonal.Sigmas(np.array([0.5, 1.0, 2.0]))
+    robust = gtsam.noiseModel.Robust.Create(gtsam.noiseModel.mEstimator.Huber.Create(1.0), noise)
+    factor = gtsam.BetweenFactorPose2(0, 1, gtsam.Pose2(2, 0, 0), robust)
+    with pytest.warns(ReadingWarning, match="took 1 robust factor for the Gaussian .*, with weights from 0.5 to 0.5$"):
+        graph = from_gtsam(_graph_with(factor), values)
+    np.testing.assert_allclose(graph.information[0], np.diag([2, 0.5, 0.125]))
+    plain = gtsam.BetweenFactorPose2(0, 1, gtsam.Pose2(2, 0, 0), gtsam.noiseModel.Gaussian.Information(graph.information[0]))
+    np.testing.assert_allclose(plain.linearize(values).information(), factor.linearize(values).information())
+
+
+def test_an_outlier_of_no_weight_is_left_out():
+    gone = gtsam.noiseModel.Robust.Create(gtsam.noiseModel.mEstimator.Tukey.Create(1.0), UNIT)
+    factors = _graph_with(
+        gtsam.BetweenFactorPose2(0, 1, gtsam.Pose2(1, 0, 0), HUBER), gtsam.BetweenFactorPose2(0, 1, gtsam.Pose2(9, 0, 0), gone)
+    )
+    with pytest.warns(ReadingWarning, match="with weights from 1 to 1; left out 1 outlier of no weight$"):
+        assert from_gtsam(factors, _planar_values()).num_edges == 1
+
+
+def test_isam2_stands_for_its_factors_and_its_estimate():
+    values = _planar_values()
+    isam = gtsam.ISAM2()
+    prior = gtsam.PriorFactorPose2(0, gtsam.Pose2(), UNIT)
+    isam.update(_graph_with(prior, gtsam.BetweenFactorPose2(0, 1, gtsam.Pose2(1.5, 0, 0), UNIT)), values)
+    graph = from_gtsam(isam)
+    assert graph.edges.tolist() == [[0, 1]]
+    np.testing.assert_allclose(graph.poses[1], [1.5, 0, 0], atol=1e-9)
+    with pytest.raises(
+        InvalidInputError, match=r"expected \(NonlinearFactorGraph, Values\), got \(NonlinearFactorGraph, NoneType\)"
+    ):
+        from_gtsam(gtsam.NonlinearFactorGraph())
+
+
+def test_a_decision_goes_back_to_gtsam_and_leaves_the_entropy_that_was_promised():
+    """GTSAM's joint information after the update, given the first pose, is that of the posterior."""
+    keys = [gtsam.symbol("x", index) for index in range(4)]
+    poses = [[0, 0, 0], [1, 0, 0.2], [2, 0.3, 0.5], [2.5, 1, 1.4]]
+    graph = PoseGraph(poses, list(pairwise(range(4))), None, np.diag([50.0, 60, 200]), ids=keys)
+    actions = [
+        Action([[2.4, 2, 2]], [(3, 4)], np.diag([50.0, 60, 200]), label="ahead"),
+        Action([[2, 2, 3], [0.5, 1, -2]], [(3, 4), (4, 5), (5, 0), (5, 1)], np.diag([50.0, 60, 200]), label="back"),
+    ]
+    decision = Planner(graph, objective="map").decide(actions, proof="optimal")
+    chosen = actions[decision.best]
+    assert chosen.label == "back"
+    new_factors, new_values = action_to_gtsam(graph, chosen)
+    assert list(map(gtsam.DefaultKeyFormatter, new_values.keys())) == ["x4", "x5"]
+    assert new_factors.size() == 4
+
+    isam = gtsam.ISAM2()
+    factors, values = to_gtsam(graph)
+    factors.add(gtsam.PriorFactorPose2(keys[0], gtsam.Pose2(), UNIT))
+    isam.update(factors, values)
+    isam.update(new_factors, new_values)
+    everything = isam.calculateEstimate()
+    marginals = gtsam.Marginals(isam.getFactorsUnsafe(), everything)
+    information = marginals.jointMarginalInformation(gtsam.KeyVector(everything.keys())).fullMatrix()[3:, 3:]
+    entropy = 15 / 2 * np.log(2 * np.pi * np.e) - np.linalg.slogdet(information)[1] / 2
+    assert joint_entropy(posterior(graph, chosen)) == pytest.approx(entropy, abs=1e-8)
+    assert from_gtsam(isam).ids.tolist() == posterior(graph, chosen).ids.tolist()

@@ -7,16 +7,20 @@ is: the two agree to first order, so information matrices, log-determinants and 
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
 
 from topobelief.arrays import FloatArray
-from topobelief.errors import InvalidInputError
+from topobelief.errors import InvalidInputError, ReadingWarning
 from topobelief.geometry import SE2_GROUP, group_of_size
+from topobelief.graph.action import Action, posterior
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.optional import load
+from topobelief.wording import counted
 
+_LEAST_WEIGHT = 1e-6  # of a robust factor, below which it is an outlier that counts no more
 _ROTATION_FIRST = np.array([3, 4, 5, 0, 1, 2])  # its own inverse
 
 
@@ -41,41 +45,81 @@ def to_gtsam(graph: PoseGraph) -> tuple[Any, Any]:
     InvalidInputError
         If an id is negative, which no GTSAM key can be.
     """
+    return _factors_and_values(graph, first_pose=0, first_edge=0)
+
+
+def action_to_gtsam(graph: PoseGraph, action: Action) -> tuple[Any, Any]:
+    """What an action adds to the factors and values of a pose graph, as for `gtsam.ISAM2.update`.
+
+    Keys of new poses are their ids in `topobelief.posterior`: one after the other above the largest id of the graph, so that
+    the symbols x0 … x9 are followed by x10.
+
+    Parameters
+    ----------
+    graph
+        With ids that are not negative.
+    action
+        Its measurements are those that its poses predict.
+
+    Returns
+    -------
+    factors : gtsam.NonlinearFactorGraph
+        One between factor per edge of the action, in their order.
+    values : gtsam.Values
+        The new poses.
+
+    Raises
+    ------
+    InvalidInputError
+        If an id is negative, which no GTSAM key can be.
+    InvalidActionError
+        If the action does not fit the graph.
+    """
+    return _factors_and_values(posterior(graph, action), first_pose=graph.num_poses, first_edge=graph.num_edges)
+
+
+def _factors_and_values(graph: PoseGraph, *, first_pose: int, first_edge: int) -> tuple[Any, Any]:
+    """Factors and values of the poses and edges from these on."""
     gtsam = load_gtsam()
     if (graph.ids < 0).any():
         raise InvalidInputError(f"expected ids from 0 as GTSAM keys, got {graph.ids.min()}")
     planar = graph.group is SE2_GROUP
     between = gtsam.BetweenFactorPose2 if planar else gtsam.BetweenFactorPose3
     order = np.arange(3) if planar else _ROTATION_FIRST
-    information = np.ascontiguousarray(graph.information[:, order][:, :, order])
+    information = np.ascontiguousarray(graph.information[first_edge:, order][:, :, order])
     factors, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
-    for key, pose in zip(graph.ids.tolist(), graph.poses.tolist(), strict=True):
+    for key, pose in zip(graph.ids[first_pose:].tolist(), graph.poses[first_pose:].tolist(), strict=True):
         values.insert(key, _to_pose(gtsam, pose))
-    for (i, j), measured, matrix in zip(graph.ids[graph.edges].tolist(), graph.measurements.tolist(), information, strict=True):
+    ends, measurements = graph.ids[graph.edges[first_edge:]].tolist(), graph.measurements[first_edge:].tolist()
+    for (i, j), measured, matrix in zip(ends, measurements, information, strict=True):
         factors.add(between(i, j, _to_pose(gtsam, measured), gtsam.noiseModel.Gaussian.Information(matrix)))
     return factors, values
 
 
-def from_gtsam(factors: Any, values: Any) -> PoseGraph:
-    """A pose graph from GTSAM's between factors and values; ids are the keys.
+def from_gtsam(factors: Any, values: Any = None) -> PoseGraph:
+    """A pose graph from GTSAM's between factors and values; ids are the keys, and symbols are shown as such.
 
     Parameters
     ----------
-    factors : gtsam.NonlinearFactorGraph
-        BetweenFactorPose2 or BetweenFactorPose3 with Gaussian noise. One prior on one pose is allowed and left out: it only
-        says where the graph lies, on which no quantity depends. Slots of removed factors are skipped.
-    values : gtsam.Values
-        A pose for every key of the factors; keys are below 2^63.
+    factors : gtsam.NonlinearFactorGraph or gtsam.ISAM2
+        BetweenFactorPose2 or BetweenFactorPose3 with Gaussian or robust noise. A robust factor is taken for the Gaussian of its
+        weight at the values, w times its information, and left out where w is below 1e-6; a `ReadingWarning` says so. One prior
+        on one pose is allowed and left out: it only says where the graph lies, on which no quantity depends. Slots of removed
+        factors are skipped. An ISAM2 stands for its factors and its estimate.
+    values : gtsam.Values, optional
+        A pose for every key of the factors; keys are below 2^63. Only an ISAM2 needs none.
 
     Raises
     ------
     InvalidInputError
-        If the arguments are of other types or swapped; if a factor is of another kind, has robust or constrained noise, or is a
-        second prior; if a pose is missing, or a key too large for an id. Names the factor or the key.
+        If the arguments are of other types or swapped; if a factor is of another kind, has constrained noise, or is a second
+        prior; if a pose is missing, or a key too large for an id. Names the factor or the key.
     InvalidGraphError
         If the graph itself is malformed, for example a self-loop.
     """
     gtsam = load_gtsam()
+    if isinstance(factors, gtsam.ISAM2) and values is None:
+        factors, values = factors.getFactorsUnsafe(), factors.calculateEstimate()
     _require_factors_and_values(gtsam, factors, values)
     keys: list[int] = sorted(values.keys())
     if keys and keys[-1] >= 2**63:
@@ -85,6 +129,7 @@ def from_gtsam(factors: Any, values: Any) -> PoseGraph:
     edges: list[tuple[int, int]] = []
     measurements: list[FloatArray] = []
     information: list[FloatArray] = []
+    weights: list[float] = []  # of robust factors
     num_priors = 0
     for number in range(factors.size()):
         factor = factors.at(number)
@@ -102,9 +147,17 @@ def from_gtsam(factors: Any, values: Any) -> PoseGraph:
         if i not in index_of or j not in index_of:
             missing = gtsam.DefaultKeyFormatter(i if i not in index_of else j)
             raise InvalidInputError(f"expected a value for every key, got none for {missing} of factor {number}")
+        noise, weight = factor.noiseModel(), 1.0
+        if isinstance(noise, gtsam.noiseModel.Robust):
+            noise, weight = noise.noise(), _weight(factor, values)
+            weights.append(weight)
+            if weight < _LEAST_WEIGHT:
+                continue
         edges.append((index_of[i], index_of[j]))
         measurements.append(_from_pose(gtsam, factor.measured()))
-        information.append(_information(gtsam, factor.noiseModel(), number))
+        information.append(weight * _information(gtsam, noise, number))
+    if weights:
+        warnings.warn(_robust_note(weights), ReadingWarning, stacklevel=2)
     if len({len(pose) for pose in poses + measurements}) > 1:
         raise InvalidInputError("expected poses and factors of one kind, got both Pose2 and Pose3")
     if not poses:
@@ -133,6 +186,20 @@ def _require_factors_and_values(gtsam: Any, factors: Any, values: Any) -> None:
     raise InvalidInputError(f"expected (NonlinearFactorGraph, Values), got {got}{advice}")
 
 
+def _weight(factor: Any, values: Any) -> float:
+    """The weight that a robust factor has in the next linearisation at these values."""
+    noise = factor.noiseModel()
+    return float(noise.robust().weight(noise.noise().mahalanobisDistance(factor.unwhitenedError(values))))
+
+
+def _robust_note(weights: list[float]) -> str:
+    outliers = sum(weight < _LEAST_WEIGHT for weight in weights)
+    kept = [weight for weight in weights if weight >= _LEAST_WEIGHT]
+    taken = f", with weights from {min(kept):.3g} to {max(kept):.3g}" if kept else ""
+    left = f"; left out {counted(outliers, 'outlier')} of no weight" if outliers else ""
+    return f"took {counted(len(kept), 'robust factor')} for the Gaussian of its weight at the values{taken}{left}"
+
+
 def _to_pose(gtsam: Any, pose: list[float]) -> Any:
     if len(pose) == SE2_GROUP.pose_size:
         return gtsam.Pose2(*pose)
@@ -149,7 +216,7 @@ def _from_pose(gtsam: Any, pose: Any) -> FloatArray:
 
 def _information(gtsam: Any, noise: Any, number: int) -> FloatArray:
     if not isinstance(noise, gtsam.noiseModel.Gaussian) or noise.isConstrained():
-        raise InvalidInputError(f"expected Gaussian noise, got {type(noise).__name__} on factor {number}")
+        raise InvalidInputError(f"expected Gaussian or robust noise, got {type(noise).__name__} on factor {number}")
     matrix = np.asarray(noise.information(), dtype=np.float64)
     order = np.arange(3) if len(matrix) == SE2_GROUP.tangent_dim else _ROTATION_FIRST
     return (matrix + matrix.T)[np.ix_(order, order)] / 2
