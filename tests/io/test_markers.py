@@ -109,6 +109,7 @@ WRONG = {
     "own frame": (message(marker("e", 0, LIST, [(0, 0), (1, 0)], at=(3, 0, 0))), "in the frame of the map, .* pose.position.x"),
     "y before x": ("markers:\n- type: 5\n  points:\n  - y: 1\n", "yaml:4: expected a point that begins with x, got y"),
     "other text": ("markers:\n- type: 5\nsome words\n", "yaml:3: expected a message as `ros2 topic echo` prints it"),
+    "deep items": ("markers:\n" + "- " * 500_000, "yaml:2: expected at most 12 levels of names, got more"),
     "deep": ("markers:\n" + "".join(" " * n + "a:\n" for n in range(99)), "expected at most 12 levels of names, got more"),
 }
 

@@ -51,6 +51,7 @@ def echoed_values(path: StrPath) -> Iterator[EchoedValue]:
             while stack and (stack[-1][0] > column or (stack[-1] == (column, "-"))):
                 stack.pop()
             stack.append((column, "-"))
+            _require_shallow(path, stack, number)
             item += sum(name == "-" for _, name in stack) == 1
             rest = text[1:].lstrip()
             column, text = column + len(text) - len(rest), rest
@@ -64,9 +65,13 @@ def echoed_values(path: StrPath) -> Iterator[EchoedValue]:
         while stack and stack[-1][0] >= column:
             stack.pop()
         stack.append((column, name))
-        if len(stack) > _DEEPEST:
-            raise FileError(path, f"expected at most {_DEEPEST} levels of names, got more", line=number)
+        _require_shallow(path, stack, number)
         yield EchoedValue(tuple(name for _, name in stack), item, value.strip(), number)
+
+
+def _require_shallow(path: StrPath, stack: list[tuple[int, str]], line: int) -> None:
+    if len(stack) > _DEEPEST:
+        raise FileError(path, f"expected at most {_DEEPEST} levels of names, got more", line=line)
 
 
 def _cut_short(text: str) -> str:

@@ -263,12 +263,12 @@ class _Database:
         return dict(zip(ids[real].tolist(), poses, strict=True))
 
     def _array(self, blob: object, kind: type, name: str) -> NDArray[Any]:
-        """A compressed array, flat; never more than a thousand times the size of the file."""
+        """A compressed array, flat; never more than a hundred times the size of the file."""
         content = blob if isinstance(blob, bytes) else b""
         rows, columns = np.frombuffer(content[-12:-4], dtype="<i4").tolist() if len(content) > 12 else (0, 0)
         expected = rows * columns * np.dtype(kind).itemsize
         try:
-            raw = zlib.decompressobj().decompress(content[:-12], max(expected, 1)) if 0 < expected <= 1000 * self._size else b""
+            raw = zlib.decompressobj().decompress(content[:-12], max(expected, 1)) if 0 < expected <= 100 * self._size else b""
         except zlib.error:
             raw = b""
         if len(raw) != expected or not raw:
