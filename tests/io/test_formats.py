@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import threading
 from pathlib import Path
 
 import pytest
@@ -37,3 +39,13 @@ def test_content_of_no_format_or_of_two_is_refused(text: str, message: str, tmp_
     path.write_text(text)
     with pytest.raises(FileError, match=message):
         read_pose_graph(path)
+
+
+def test_lines_may_come_through_a_pipe(tmp_path: Path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    writer = threading.Thread(target=pipe.write_text, args=(G2O,))
+    writer.start()
+    graph = read_pose_graph(pipe)
+    writer.join()
+    assert graph.num_edges == 1

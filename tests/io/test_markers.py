@@ -28,7 +28,7 @@ def test_the_graph_of_slam_toolbox_is_read(tmp_path: Path):
     assert graph.chi2 == pytest.approx(0, abs=1e-20)
     assert len(notes) == 1
     assert "positions and edges alone" in notes[0]
-    assert "--noise (in Python noise=(metres, radians))" in notes[0]
+    assert "convert --noise` (in Python noise=(metres, radians))" in notes[0]
 
 
 def test_ids_of_spheres_are_kept_in_any_order(tmp_path: Path):
@@ -99,6 +99,11 @@ def test_parts_are_components_and_isolated_poses_are_kept(tmp_path: Path):
 LINE = marker("e", 0, LIST, [(0, 0), (1, 0)])
 WRONG = {
     "no lines": (message(marker("s", 0, SPHERE)), "expected lines between poses among the markers, got 1 marker without any"),
+    "a point": (message(marker("e", 0, LIST, [(1, 1), (1, 1)])), "got 1 marker without any"),
+    "a residual": (
+        message(marker("c", 0, LIST, [(1, 1), (2, 1)]), marker("residuals", 1, LIST, [(1, 1), (2, 1)])),
+        "got 2 markers without any",
+    ),
     "nothing": ("markers: []\n", "expected lines between poses among the markers"),
     "one end": (message(marker("e", 0, LIST, [(0, 0)])), r"yaml:2: expected two points a line, got 1 points"),
     "cut short": (message(LINE + "  - '...'\n"), "got one that is cut short; print it with `ros2 topic echo --full-length`"),

@@ -25,7 +25,9 @@ _DECISION = "Decision"
 _PROOF = "Bounds and proof"
 _OUTPUT = "Output"
 
-GraphFile = Annotated[Path, typer.Argument(metavar="GRAPH", help="Pose graph in g2o or TORO format.")]
+GraphFile = Annotated[
+    Path, typer.Argument(metavar="GRAPH", help="Pose graph: g2o, TORO, RTAB-Map .db or markers, told by content.")
+]
 Goals = Annotated[
     list[GivenPlace] | None,
     typer.Option(

@@ -1,1 +1,1 @@
-"""Files in and out: pose graphs (g2o, TORO) and floor plans, one file per format."""
+"""Files in and out: pose graphs in the formats of SLAM systems, paths and floor plans, one file per format."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Unpack
 
 from topobelief.graph.pose_graph import PoseGraph
@@ -51,6 +52,8 @@ def read_pose_graph(path: StrPath, **options: Unpack[ReadingKeywords]) -> PoseGr
 
 def read_graph_file(path: StrPath, options: ReadingOptions) -> ReadGraph:
     """As `read_pose_graph`, with what was dropped or assumed as notes in place of warnings."""
-    head = read_head(path)
+    head = (
+        read_head(path) if Path(path).is_file() else b""
+    )  # what comes through a pipe can be read once, and is taken for lines
     reader = next((reader for recognises, reader in _BY_HEAD if recognises(head)), None)
     return read_lines(path, (G2O, TORO), options) if reader is None else reader(path, options)

@@ -76,9 +76,7 @@ def read_markers(path: StrPath, options: ReadingOptions) -> ReadGraph:
     joined = [_pairs([[a, b] for a, b in pairwise(m.points)]) for m in strips]
     residuals, constraints = _of_lists(path, lists)
     lines = np.concatenate([_NO_PAIRS, *joined, constraints])
-    if len(lines) == 0:
-        found = f"{counted(len(markers), 'marker')} without any"
-        raise FileError(path, f"expected lines between poses among the markers, got {found}; record the topic that shows edges")
+    _require_edges(path, markers, lines)
     planar = np.ptp(lines[:, :, 2]) < _RESOLUTION
     points = np.concatenate([drawn, residuals[:, 1], residuals[:, 0], lines.reshape(-1, 3)])
     positions, where = _places(points[:, :2] if planar else points)
@@ -86,6 +84,7 @@ def read_markers(path: StrPath, options: ReadingOptions) -> ReadGraph:
     ends = where[len(drawn) : len(drawn) + 2 * len(residuals)].reshape(2, -1)
     leader = _leaders(len(positions), ends)
     edges = _distinct(leader[pairs])
+    _require_edges(path, markers, edges)
     poses = np.unique(leader[where[: len(drawn)]])
     others = np.setdiff1d(edges, poses)  # ends of lines at which nothing is drawn, as Cartographer's submaps
     nodes = np.concatenate([others, poses])
@@ -96,6 +95,13 @@ def read_markers(path: StrPath, options: ReadingOptions) -> ReadGraph:
     except InvalidGraphError as error:
         raise FileError(path, str(error)) from None
     return wanted_part(path, graph, options, [_note(options)])
+
+
+def _require_edges(path: StrPath, markers: list[_Marker], edges: FloatArray | IntArray) -> None:
+    """Refuse a drawing in which no line joins two poses."""
+    if len(edges) == 0:
+        found = f"{counted(len(markers), 'marker')} without any"
+        raise FileError(path, f"expected lines between poses among the markers, got {found}; record the topic that shows edges")
 
 
 def _ids(num_others: int, num_poses: int, num_drawn: int, bodies: list[_Marker]) -> IntArray:
@@ -122,7 +128,7 @@ def _note(options: ReadingOptions) -> str:
     if options.noise is None:
         return (
             f"{missing}, and every edge weighs 1 per m^2 and rad^2; numbers of spanning trees are right, entropies and metres "
-            "mean nothing before a noise is stated, with --noise (in Python noise=(metres, radians))"
+            "mean nothing before a noise is stated, with `topobelief convert --noise` (in Python noise=(metres, radians))"
         )
     return (
         f"{missing}, and every edge has the stated noise, {options.noise[0]:g} m and {math.degrees(options.noise[1]):g} degrees"
