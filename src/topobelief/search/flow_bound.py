@@ -23,8 +23,8 @@ from topobelief.world import World
 _OBJECTIVES = ("error", "map", "joint", "per_pose")
 _ARCS = 400_000  # aimed at: as many layers as make about so many arcs
 _FINEST, _COARSEST = 40, 3  # pieces per spacing
-_VARIABLES = 1000  # at most so many pairs of a new pose and a cell
-_MOST_CELLS = 40
+_VARIABLES = 2000  # at most so many pairs of a new pose and a cell
+_MOST_CELLS = 80
 _SAME_PLACE = 1e-9  # metres
 _ROUNDING = 1e-9  # relative; bounds are lowered by it
 
@@ -179,6 +179,6 @@ def _cells(ways: Ways, delta: float, size: float, most: int) -> Int32Array:
         return np.zeros(first_pieces(ways.lengths, delta)[-1], dtype=np.int32)
     while True:
         cells = cells_of_pieces(ways, delta, size)
-        if cells.max() < min(most, _MOST_CELLS):
+        if cells.max() < min(max(most, 1), _MOST_CELLS):
             return cells
         size *= 1.2

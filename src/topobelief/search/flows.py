@@ -266,8 +266,7 @@ class FlowBound:
             return None
         ways = self._rewards.layers.arcs.way[course.arcs]
         targets = self._rewards.ways.target[ways[ways >= 0]]
-        first = self._rewards.layers.first_state // self._rewards.layers.num_labels
-        places = np.concatenate([[first], targets])
+        places = np.concatenate([[self._rewards.layers.first_vertex], targets])
         vertices = self._vertices[places]
         return vertices[vertices >= 0]
 

@@ -40,7 +40,7 @@ class Records:
 
 @dataclass(frozen=True, slots=True)
 class Arcs:
-    """Arcs between states (k V + v) C + c at vertex v, layer k, last label c of C; those of lower layers first.
+    """Arcs between states k S + s at spot s of S, a vertex and a last label, and layer k; those of lower layers first.
 
     Attributes
     ----------
@@ -72,11 +72,12 @@ class Layers:
     Attributes
     ----------
     num_spots, num_layers
-        V C, vertices times labels.
+        S: pairs of a vertex and a label that some walk has there.
     num_labels
         C.
     pieces_per_pose
         m.
+    first_vertex
     first_state
         Where walks begin.
     """
@@ -85,6 +86,7 @@ class Layers:
     num_layers: int
     num_labels: int
     pieces_per_pose: int
+    first_vertex: int
     first_state: int
     arcs: Arcs
     records: Records
@@ -118,20 +120,55 @@ def build_layers(
         Of the pieces of all ways (`ways.first_pieces`), from 0 on.
     """
     num_vertices, num_labels = len(to_go), int(labels.max()) + 1
+    first = first_pieces(ways.lengths, delta)
+    since = _since_label(ways.source, ways.target, ways.lengths, labels, first, delta, num_vertices, num_labels, first_vertex)
+    vertex, label = np.nonzero(since <= delta * pieces_per_pose * (1 + 1e-6) + 1e-6)
+    spot = np.full((num_vertices, num_labels), -1)
+    spot[vertex, label] = np.arange(len(vertex))
     num_layers = int(np.floor(max_length / delta + 1e-6)) + 1
     order = np.argsort(ways.source, kind="stable")
     out = np.searchsorted(ways.source[order], np.arange(num_vertices + 1))
-    reach = (out, order, ways.target, ways.lengths, to_go, labels, first_pieces(ways.lengths, delta), num_labels, pieces_per_pose)
-    nearest, furthest = _reached(*reach, first_vertex, num_layers, delta, max_length)
-    sizes = _arcs(*reach, is_end, nearest, furthest, delta, max_length, first_vertex, False, *_room(0, 0))
+    reach = (out, order, ways.target, ways.lengths, to_go, labels, first, vertex, label, spot, pieces_per_pose)
+    begin = int(spot[first_vertex, 0])
+    nearest, furthest = _reached(*reach, begin, num_layers, delta, max_length)
+    sizes = _arcs(*reach, is_end, nearest, furthest, delta, max_length, begin, False, *_room(0, 0))
     arcs, records = _room(sizes[0], sizes[1])
-    _arcs(*reach, is_end, nearest, furthest, delta, max_length, first_vertex, True, arcs, records)
-    num_spots = num_vertices * num_labels
-    return Layers(num_spots, num_layers, num_labels, pieces_per_pose, first_vertex * num_labels, Arcs(*arcs), Records(*records))
+    _arcs(*reach, is_end, nearest, furthest, delta, max_length, begin, True, arcs, records)
+    return Layers(len(vertex), num_layers, num_labels, pieces_per_pose, first_vertex, begin, Arcs(*arcs), Records(*records))
 
 
 def _room(num_arcs: int, num_records: int) -> tuple[Int32Array, Int32Array]:
     return np.empty((7, num_arcs), np.int32), np.empty((4, num_records), np.int32)
+
+
+@compiled
+def _since_label(
+    source: IntArray,
+    target: IntArray,
+    lengths: FloatArray,
+    labels: Int32Array,
+    first: IntArray,
+    delta: float,
+    num_vertices: int,
+    num_labels: int,
+    first_vertex: int,
+) -> FloatArray:
+    """Least metres driven since a piece with a label, shape (V, C); the first vertex has label 0."""
+    since = np.full((num_vertices, num_labels), np.inf)
+    since[first_vertex, 0] = 0.0
+    for e in range(len(lengths)):
+        for p in range(first[e], first[e + 1]):
+            left = max(lengths[e] - (p - first[e] + 1) * delta, 0.0)
+            since[target[e], labels[p]] = min(since[target[e], labels[p]], left)
+    again = True
+    while again:
+        again = False
+        for e in range(len(lengths)):
+            for c in range(num_labels):
+                if since[source[e], c] + lengths[e] < since[target[e], c]:
+                    since[target[e], c] = since[source[e], c] + lengths[e]
+                    again = True
+    return since
 
 
 @compiled
@@ -143,17 +180,19 @@ def _reached(
     to_go: FloatArray,
     labels: Int32Array,
     first: IntArray,
-    num_labels: int,
+    vertex: IntArray,
+    label: IntArray,
+    spots: IntArray,
     m: int,
-    first_vertex: int,
+    begin: int,
     num_layers: int,
     delta: float,
     max_length: float,
 ) -> tuple[FloatArray, FloatArray]:
-    """Least and largest length at which walks reach each state, shape (layers, V C); inf and -inf for none."""
-    num_spots = len(to_go) * num_labels
+    """Least and largest length at which walks reach each state, shape (layers, S); inf and -inf for none."""
+    num_spots = len(vertex)
     nearest, furthest = np.full((num_layers, num_spots), np.inf), np.full((num_layers, num_spots), -np.inf)
-    nearest[0, first_vertex * num_labels] = furthest[0, first_vertex * num_labels] = 0.0
+    nearest[0, begin] = furthest[0, begin] = 0.0
     for k in range(num_layers):
         again = True
         while again:
@@ -161,7 +200,7 @@ def _reached(
             for spot in range(num_spots):
                 if nearest[k, spot] == np.inf:
                     continue
-                v, c = spot // num_labels, spot % num_labels
+                v, c = vertex[spot], label[spot]
                 for r in range(out[v], out[v + 1]):
                     e = order[r]
                     w, low, high = target[e], nearest[k, spot] + lengths[e], furthest[k, spot] + lengths[e]
@@ -169,7 +208,9 @@ def _reached(
                         at = max(low, q * delta)
                         if q >= num_layers or not at + to_go[w] <= max_length * (1.0 + 1e-12) + 1e-9:
                             break
-                        to = w * num_labels + (labels[first[e] + q // m * m - k - 1] if q // m > k // m else c)
+                        to = spots[w, labels[first[e] + q // m * m - k - 1] if q // m > k // m else c]
+                        if to < 0:
+                            continue
                         if at < nearest[q, to]:
                             again = again or (q == k and at < nearest[q, to] - 1e-12)
                             nearest[q, to] = at
@@ -190,14 +231,16 @@ def _arcs(
     to_go: FloatArray,
     labels: Int32Array,
     first: IntArray,
-    num_labels: int,
+    vertex: IntArray,
+    label: IntArray,
+    spots: IntArray,
     m: int,
     is_end: BoolArray,
     nearest: FloatArray,
     furthest: FloatArray,
     delta: float,
     max_length: float,
-    first_vertex: int,
+    begin: int,
     fill: bool,
     arcs: Int32Array,
     records: Int32Array,
@@ -205,10 +248,10 @@ def _arcs(
     """Count the arcs and records, and put them into the tables if asked to."""
     num_layers, num_spots = nearest.shape
     a = r = 0
-    if is_end[first_vertex]:
+    if is_end[vertex[begin]]:
         if fill:
             arcs[0, a], arcs[1, a], arcs[2, a], arcs[3, a], arcs[4, a], arcs[5, a], arcs[6, a] = (
-                first_vertex * num_labels,
+                begin,
                 -1,
                 -1,
                 0,
@@ -221,7 +264,7 @@ def _arcs(
         for spot in range(num_spots):
             if nearest[k, spot] == np.inf:
                 continue
-            v, c = spot // num_labels, spot % num_labels
+            v, c = vertex[spot], label[spot]
             for o in range(out[v], out[v + 1]):
                 e = order[o]
                 w, low, high = target[e], nearest[k, spot] + lengths[e], furthest[k, spot] + lengths[e]
@@ -231,17 +274,20 @@ def _arcs(
                     highest -= 1
                 if highest < lowest:
                     continue
-                label = c
+                before = c
                 for t in range(k // m + 1, highest // m + 1):
                     if fill:
-                        records[0, r], records[1, r], records[2, r], records[3, r] = t, e, t * m - k - 1, label
-                    label = labels[first[e] + t * m - k - 1]
+                        records[0, r], records[1, r], records[2, r], records[3, r] = t, e, t * m - k - 1, before
+                    before = labels[first[e] + t * m - k - 1]
                     r += 1
                 for q in range(lowest, highest + 1):
                     count = q // m - k // m
-                    label = labels[first[e] + q // m * m - k - 1] if count else c
+                    before = labels[first[e] + q // m * m - k - 1] if count else c
+                    to = spots[w, before]
+                    if to < 0:
+                        continue
                     if fill:
-                        arcs[0, a], arcs[1, a], arcs[2, a] = k * num_spots + spot, q * num_spots + w * num_labels + label, e
+                        arcs[0, a], arcs[1, a], arcs[2, a] = k * num_spots + spot, q * num_spots + to, e
                         arcs[3, a], arcs[4, a], arcs[5, a], arcs[6, a] = record, count, -1, -1
                     a += 1
                     if not is_end[w] or not max(low, q * delta) <= max_length * (1.0 + 1e-12) + 1e-9:
@@ -255,7 +301,7 @@ def _arcs(
                     if q % m == 0 and high <= tie:
                         continue
                     if fill:
-                        records[0, r], records[1, r], records[3, r] = q // m + 1, e, label
+                        records[0, r], records[1, r], records[3, r] = q // m + 1, e, before
                         records[2, r] = int(np.ceil(lengths[e] / delta - 1e-9))
                         arcs[0, a], arcs[1, a], arcs[2, a] = k * num_spots + spot, -1, e
                         arcs[3, a], arcs[4, a], arcs[5, a], arcs[6, a] = record, count, r, q // m + 1

@@ -112,5 +112,7 @@ def alone(plan: Plan) -> Mixture:
     count, num_seen = plan.closures.shape
     num_cells = int(plan.cells.max(initial=0)) + 1
     none = np.zeros(0, np.int64)
-    nothing = Background(num_cells, np.zeros((count * num_cells, num_seen)), none, none, np.zeros((0, *plan.odometry.shape[1:])))
+    nothing = Background(
+        num_cells, np.zeros((count * num_cells, num_seen)), none, none, np.zeros((0, *plan.odometry.shape[1:]))
+    )
     return Mixture([plan], np.ones(1), nothing, 0.0, only_used=True)

@@ -94,7 +94,7 @@ def cells_of_pieces(ways: Ways, delta: float, cell: float) -> Int32Array:
     piece = np.arange(first[-1]) - first[way]
     middle = np.minimum((piece + 0.5) * delta, ways.lengths[way])
     places = ways.begin[way] + (middle / ways.lengths[way])[:, None] * (ways.end - ways.begin)[way]
-    squares = np.floor(places / cell).astype(np.int64)
+    squares = np.floor((places - places.min(axis=0)) / cell).astype(np.int64)
     return np.unique(squares, axis=0, return_inverse=True)[1].ravel().astype(np.int32)
 
 
