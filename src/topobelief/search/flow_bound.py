@@ -176,7 +176,7 @@ def flow_bound(
 def _cells(ways: Ways, delta: float, size: float, most: int) -> Int32Array:
     """The cell of each piece: squares of a size, or larger ones where that would make too many of them."""
     if most <= 1:
-        return np.zeros(first_pieces(ways.lengths, delta)[-1], dtype=np.int32)
+        return np.zeros(int(first_pieces(ways.lengths, delta)[-1]), dtype=np.int32)
     while True:
         cells = cells_of_pieces(ways, delta, size)
         if cells.max() < min(max(most, 1), _MOST_CELLS):

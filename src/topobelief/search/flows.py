@@ -36,7 +36,7 @@ _TOLL_TRIALS = 2  # longest paths a step, to find the price of a metre
 _STEPS_BEFORE_SPLIT = 3
 _SLOW = 0.15  # of what is missing to the value of the flow: a step that raises the bound by less is slow
 _CONVERGED = 0.25  # of what is missing to the best value: a part whose own optimum is known that well is split
-_SLOW_STEPS = 3  # after so many in a row a part is split too; a few more, and what cannot be split is left as it is
+_SLOW_STEPS = 8  # after so many in a row a part is split too; a few more, and what cannot be split is left as it is
 _LEAST_WEIGHT = 1e-3  # of walks that count where parts are split
 _SMALL_WEIGHT = 0.05  # of all walks of the active set, where those that count agree
 

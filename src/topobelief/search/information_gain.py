@@ -168,7 +168,7 @@ class _Posterior:
         if self.kind == "joint":
             identity = np.eye(len(self.variables) * kappa)
             inverse = cho_solve_banded((self.root_new, True), identity, check_finite=False)
-        begin = np.searchsorted(self.variables, np.arange(count + 1) * cells)
+        begin: IntArray = np.searchsorted(self.variables, np.arange(count + 1) * cells)
         each = np.zeros((len(self.variables), kappa, kappa))
         odometry = np.zeros((count, cells, cells, kappa, kappa))
         before = slice(0, 0)

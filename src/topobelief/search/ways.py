@@ -91,7 +91,7 @@ def cells_of_pieces(ways: Ways, delta: float, cell: float) -> Int32Array:
     """Label of the square of the plane in which the middle of each piece is, from 0 on, shape (P,)."""
     first = first_pieces(ways.lengths, delta)
     way = np.repeat(np.arange(len(ways.lengths)), np.diff(first))
-    piece = np.arange(first[-1]) - first[way]
+    piece: IntArray = np.arange(int(first[-1])) - first[way]
     middle = np.minimum((piece + 0.5) * delta, ways.lengths[way])
     places = ways.begin[way] + (middle / ways.lengths[way])[:, None] * (ways.end - ways.begin)[way]
     squares = np.floor((places - places.min(axis=0)) / cell).astype(np.int64)
