@@ -1,6 +1,7 @@
 """The bound by flows: no walk is better."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -36,6 +37,27 @@ def test_no_walk_is_better_than_the_bound(seed, objective):
     values = case.values(objective, walks)
     _, found = _run(case, objective, float(values.min()), 5)
     assert set(found) <= {tuple(walk.tolist()) for walk in walks}
+
+
+@pytest.mark.parametrize("objective", ["error", "map", "joint"])
+@pytest.mark.parametrize(("seed", "detour"), [(1, 3.0), (4, 2.5), (9, 3.0), (23, 3.0), (31, 2.5)])
+def test_no_long_walk_is_better_than_the_bound(seed, detour, objective):
+    """Two to three times as long as the shortest one: walks turn back, go round, and pass cells again."""
+    case = random_case(seed)
+    case = replace(case, max_length=detour * float(case.roadmap.distances_to(0)[1]))
+    walks = case.walks()
+    assert len(walks) > 20
+    _run(case, objective, float(case.values(objective, walks).min()), 4)
+
+
+def test_several_cells_bound_no_worse_than_one(monkeypatch):
+    """Poses of one number in different cells are different poses: a flow through both gains less."""
+    case = random_case(17)
+    best = float(case.values("map", case.walks()).min())
+    with_cells, _ = _run(case, "map", best, 2)
+    monkeypatch.setattr("topobelief.search.flow_bound._MOST_CELLS", 1)
+    with_one, _ = _run(case, "map", best, 2)
+    assert with_one.lower_bound <= with_cells.lower_bound + 1e-9 <= best + 1e-8
 
 
 def test_the_bound_meets_the_best_value():

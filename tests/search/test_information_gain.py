@@ -1,6 +1,7 @@
 """Gains of plans: exact on walks, concave, with the right gradient."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ import topobelief as tb
 from roadmap_walks import map_error, plan_of, random_case
 from topobelief.search.criteria import Criterion
 from topobelief.search.information_gain import gain, gain_and_slopes
-from topobelief.search.plans import Plan
+from topobelief.search.plans import Background, Mixture, Plan
 from topobelief.search.reduced_prior import ReducedPrior, reduced_prior
 
 KINDS = ("map", "joint", "error")
@@ -99,3 +100,26 @@ def test_concave_and_below_the_bound_by_its_gradient(kind, seed):
     least = criterion.least(value, ahead)
     assert criterion.of_gain(value + ahead) - 1e-12 <= least <= criterion.of_gain(ends[1]) + 1e-9
     assert criterion.needed(value, least) == pytest.approx(ahead, rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["map", "error"])
+def test_mixtures_in_different_cells_gain_less(kind):
+    """Two walks as one variable a pose see more together than as two; slopes of both are derivatives."""
+    rng = np.random.default_rng(1)
+    case = random_case(5)
+    seen = np.array([0, 2, 3, 7, case.graph.num_poses - 1])
+    prior = _prior(case, seen)
+    left, right = (_random_plan(rng, 3, len(seen)) for _ in range(2))
+    nothing = Background(2, np.zeros((6, len(seen))), np.zeros(0, int), np.zeros(0, int), np.zeros((0, 3, 3)))
+    apart = replace(right, cells=np.array([0, 1, 1]))
+    half = np.array([0.5, 0.5])
+    together = gain(prior, kind, Mixture([left, right], half, nothing, 0.0))
+    value, slopes = gain_and_slopes(prior, kind, Mixture([left, apart], half, nothing, 0.0))
+    ends = gain(prior, kind, left), gain(prior, kind, right)
+    assert sum(ends) / 2 <= value < together
+    for plan, other in ((left, ends[0]), (apart, ends[1])):
+        ahead = slopes.of(plan) - (slopes.of(left) + slopes.of(apart)) / 2
+        assert other <= value + ahead + 1e-12
+    step = 1e-5
+    one, two = (gain(prior, kind, Mixture([left, apart], half + np.array([h, -h]), nothing, 0.0)) for h in (step, 2 * step))
+    assert (4 * one - two - 3 * value) / (2 * step) == pytest.approx(slopes.of(left) - slopes.of(apart), rel=1e-3)

@@ -20,7 +20,7 @@ import numpy as np
 
 from topobelief.arrays import FloatArray
 from topobelief.search.information_gain import Kind
-from topobelief.search.plans import Plan
+from topobelief.search.plans import Mixture, Plan
 from topobelief.search.reduced_prior import ReducedPrior
 
 _KINDS: dict[str, Kind] = {"map": "map", "joint": "joint", "per_pose": "joint", "error": "error"}
@@ -108,7 +108,7 @@ class Criterion:
         value = count * self.per_new_pose + (self.num_new - count) * self.per_idle_pose
         return value - self.reference * (self.free_poses + count)
 
-    def linear(self, plan: Plan) -> float:
+    def linear(self, plan: Plan | Mixture) -> float:
         """What is linear in the plan."""
         value = plan.num_poses * self.per_new_pose + (self.num_new - plan.num_poses) * self.per_idle_pose
         return value - self.reference * (self.free_poses + plan.num_poses) + self.price * plan.cost

@@ -10,19 +10,21 @@ from numpy.typing import ArrayLike
 from topobelief.candidates.roadmap import Roadmap
 from topobelief.errors import InvalidInputError, PlanningError, require_choice
 from topobelief.graph.pose_graph import PoseGraph
+from topobelief.linalg.block_cholesky import Int32Array
 from topobelief.search.bound import ClosureRule
 from topobelief.search.criteria import Criterion
 from topobelief.search.flows import FlowBound
 from topobelief.search.layers import build_layers
 from topobelief.search.reduced_prior import reduced_prior
 from topobelief.search.rewards import Rewards, odometry_powers
-from topobelief.search.ways import Ways, find_sightings
+from topobelief.search.ways import Ways, cells_of_pieces, find_sightings, first_pieces
 from topobelief.world import World
 
 _OBJECTIVES = ("error", "map", "joint", "per_pose")
 _ARCS = 400_000  # aimed at: as many layers as make about so many arcs
 _FINEST, _COARSEST = 40, 3  # pieces per spacing
-_IDLE = 1e-4  # information of the odometry of idle poses, in that of others, where their number does not count
+_VARIABLES = 2000  # at most so many pairs of a new pose and a cell
+_MOST_CELLS = 80
 _SAME_PLACE = 1e-9  # metres
 _ROUNDING = 1e-9  # relative; bounds are lowered by it
 
@@ -141,7 +143,9 @@ def flow_bound(
         pieces_per_pose = int(np.clip(_ARCS * spacing / max(per_metre, 1e-9), _COARSEST, _FINEST))
     delta = spacing / pieces_per_pose
     first_vertex = at_pose if has_lead else int(place[start])
-    layers = build_layers(ways, first_vertex, remaining, is_end, whole, delta, pieces_per_pose)
+    counts_idle = objective in ("joint", "per_pose")
+    cells = _cells(ways, delta, closures.radius, 1 if counts_idle else round(_VARIABLES * spacing / whole))
+    layers = build_layers(ways, first_vertex, remaining, is_end, whole, delta, pieces_per_pose, cells)
     num_new = max(1, int(layers.records.number.max(initial=1)))
     sightings = find_sightings(graph, ways, pose, delta, closures, world, num_new)
     seen = sightings.seen if len(sightings.seen) else np.array([pose])
@@ -155,11 +159,11 @@ def flow_bound(
         with_errors=objective == "error",
     )
     powers = odometry_powers(graph.group, ways.poses(graph, pose), graph.positions[pose], omega)
-    idle = powers[0, 0] * (_IDLE if objective in ("error", "map") else 1.0)
+    idle = powers[0, 0] * float(counts_idle)
     fewest = max(0, math.ceil((whole - max_length + to_go[start]) / spacing - 1e-6))
     criterion = Criterion.of(objective, prior, idle, num_new, fewest)
     most = closures.max_per_pose or 0
-    rewards = Rewards(layers, ways, sightings, delta, powers, idle, prior.earliest, most, num_new, driven, prices)
+    rewards = Rewards(layers, ways, sightings, delta, powers, idle, prior.earliest, most, num_new, driven, prices, cells)
     covers = (
         f"every walk of the roadmap of at most {max_length:.6g} m"
         + (" to the goal" if goal is not None else " that returns to its start" if return_to_start else "")
@@ -167,3 +171,14 @@ def flow_bound(
         f"{100 * delta:.3g} cm"
     )
     return FlowBound(prior, criterion, rewards, vertices, max_length, covers)
+
+
+def _cells(ways: Ways, delta: float, size: float, most: int) -> Int32Array:
+    """The cell of each piece: squares of a size, or larger ones where that would make too many of them."""
+    if most <= 1:
+        return np.zeros(int(first_pieces(ways.lengths, delta)[-1]), dtype=np.int32)
+    while True:
+        cells = cells_of_pieces(ways, delta, size)
+        if cells.max() < min(max(most, 1), _MOST_CELLS):
+            return cells
+        size *= 1.2

@@ -23,19 +23,20 @@ from topobelief.search.criteria import Criterion
 from topobelief.search.cuts import best_line, best_place
 from topobelief.search.information_gain import gain_and_slopes
 from topobelief.search.layers import arcs_above, longest_path
-from topobelief.search.plans import Plan, mixture
+from topobelief.search.plans import Mixture
 from topobelief.search.reduced_prior import ReducedPrior
 from topobelief.search.rewards import Course, Rewards, allowed_arcs, used_records
 from topobelief.search.weights import best_weights
 
 _SAME_PLACE = 1e-9  # metres
 _ROUNDING = 1e-9  # relative; bounds are lowered by it
+_BACKGROUND = 1e-5  # share of the background in each flow: it is counted as if walks had it, which lowers bounds by as little
 _LARGEST_SET = 40  # walks whose weights are optimised
 _TOLL_TRIALS = 2  # longest paths a step, to find the price of a metre
 _STEPS_BEFORE_SPLIT = 3
 _SLOW = 0.15  # of what is missing to the value of the flow: a step that raises the bound by less is slow
 _CONVERGED = 0.25  # of what is missing to the best value: a part whose own optimum is known that well is split
-_SLOW_STEPS = 3  # after so many in a row a part is split too; a few more, and what cannot be split is left as it is
+_SLOW_STEPS = 8  # after so many in a row a part is split too; a few more, and what cannot be split is left as it is
 _LEAST_WEIGHT = 1e-3  # of walks that count where parts are split
 _SMALL_WEIGHT = 0.05  # of all walks of the active set, where those that count agree
 
@@ -74,6 +75,7 @@ class FlowBound:
         whole = _Part(every, used_records(arcs, every, len(rewards.layers.records.number)))
         self._open: list[tuple[float, int, _Part]] = [(-math.inf, next(self._counter), whole)]
         self._begin, self._end = rewards.places()
+        self._background = rewards.background()
         self._num_arcs = len(every)
         self.num_steps = 0
 
@@ -141,9 +143,9 @@ class FlowBound:
         """One step of Frank-Wolfe on a part: its bound, its walks, their weights."""
         criterion, rewards = self._criterion, self._rewards
         layers = rewards.layers
-        plan = mixture([course.plan for course in part.courses], part.weights) if part.courses else self._nothing()
+        plan = self._mixture(part)
         gain, slopes = gain_and_slopes(self._prior, criterion.kind, plan)
-        offset = slopes.of(plan)
+        offset = sum(w * slopes.of(c.plan) for w, c in zip(part.weights.tolist(), part.courses, strict=True))
         priced = bool(rewards.prices.any()) or criterion.counts_poses
         rate = criterion.least_rate(gain, part.ahead) if priced else 1.0
         worth = rewards.of_records(slopes, part.records)
@@ -240,23 +242,23 @@ class FlowBound:
         plans = [course.plan for course in part.courses]
         lengths = np.array([plan.length for plan in plans])
         touched = np.flatnonzero(np.array([plan.closures.any(axis=0) for plan in plans]).any(axis=0))
+        background = self._background
         criterion = self._criterion
         linear = np.array([criterion.linear(plan) for plan in plans])
         scale = 1e-2 * max(abs(criterion.of_gain(0.0)), 1e-300) if criterion.kind == "error" else 1.0
 
         def value(weights: FloatArray) -> tuple[float, FloatArray]:
-            gained, slopes = gain_and_slopes(self._prior, criterion.kind, mixture(plans, weights), among=touched)
+            mixture = Mixture(plans, weights, background, _BACKGROUND, only_used=True)
+            gained, slopes = gain_and_slopes(self._prior, criterion.kind, mixture, among=touched)
             gradient = linear - criterion.rate(gained) * np.array([slopes.of(plan) for plan in plans])
             return (criterion.of_gain(gained) + float(linear @ weights)) / scale, gradient / scale
 
         part.weights = best_weights(value, start, lengths, max(self._max_length, float(lengths.min())))
 
-    def _nothing(self) -> Plan:
-        """A plan to begin with: no closures, and odometry as on the first way."""
-        rewards = self._rewards
-        closures = np.zeros((rewards.num_new, len(self._prior.closures)))
-        odometry = np.broadcast_to(rewards.powers[0, 0], (rewards.num_new, *rewards.idle.shape)).copy()
-        return Plan(closures, odometry, 0.0, 0.0, 0.0)
+    def _mixture(self, part: _Part) -> Mixture:
+        """The flow of a part; the background to begin with."""
+        plans = [course.plan for course in part.courses]
+        return Mixture(plans, part.weights, self._background, _BACKGROUND if plans else 1.0)
 
     def _walk(self, course: Course) -> IntArray | None:
         """The vertices of a walk within the length, or None."""
@@ -264,7 +266,7 @@ class FlowBound:
             return None
         ways = self._rewards.layers.arcs.way[course.arcs]
         targets = self._rewards.ways.target[ways[ways >= 0]]
-        places = np.concatenate([[self._rewards.layers.first_state], targets])
+        places = np.concatenate([[self._rewards.layers.first_vertex], targets])
         vertices = self._vertices[places]
         return vertices[vertices >= 0]
 

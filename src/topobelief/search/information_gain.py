@@ -23,11 +23,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.linalg import cho_factor, cho_solve, cho_solve_banded, cholesky_banded
 
 from topobelief.arrays import FloatArray, IntArray
 from topobelief.errors import IllConditionedError
-from topobelief.search.plans import Plan
+from topobelief.search.plans import Mixture, Plan, alone
 from topobelief.search.reduced_prior import ReducedPrior
 
 Kind = Literal["map", "joint", "error"]
@@ -37,14 +37,14 @@ _LARGEST_JITTER = 1e-7
 
 @dataclass(frozen=True, slots=True)
 class Slopes:
-    """The gradient of a gain.
+    """The gradient of a gain; variables are numbered as in `Background`.
 
     Attributes
     ----------
-    closures : shape (T, m)
-        Of each closure of a new pose with a seen pose.
-    odometry : shape (T, kappa, kappa)
-        G_t: odometry V of new pose t counts tr G_t V.
+    closures : shape (T C, m)
+        Of each closure of a new pose in a cell with a seen pose.
+    odometry : shape (T, C, C, kappa, kappa)
+        G_tbc: odometry V from cell b to new pose t in cell c counts tr G_tbc V. The pose where the robot is counts as in any.
     """
 
     closures: FloatArray
@@ -52,15 +52,21 @@ class Slopes:
 
     def of(self, plan: Plan) -> float:
         """The linear function at a plan."""
-        return float(np.vdot(self.closures, plan.closures) + np.vdot(self.odometry, plan.odometry))
+        at = np.arange(len(plan.closures))
+        variables = at * self.odometry.shape[1] + plan.cells
+        before = np.concatenate([np.zeros(1, np.int64), plan.cells[:-1]])[: len(at)]
+        of_closures = float(np.vdot(self.closures[variables], plan.closures))
+        return of_closures + float(np.vdot(self.odometry[at, before, plan.cells], plan.odometry))
 
 
-def gain(prior: ReducedPrior, kind: Kind, plan: Plan) -> float:
+def gain(prior: ReducedPrior, kind: Kind, plan: Plan | Mixture) -> float:
     """What a plan gains."""
     return _Posterior(prior, kind, plan).gain
 
 
-def gain_and_slopes(prior: ReducedPrior, kind: Kind, plan: Plan, *, among: IntArray | None = None) -> tuple[float, Slopes]:
+def gain_and_slopes(
+    prior: ReducedPrior, kind: Kind, plan: Plan | Mixture, *, among: IntArray | None = None
+) -> tuple[float, Slopes]:
     """What a plan gains, and the gradient there.
 
     Parameters
@@ -76,24 +82,33 @@ def gain_and_slopes(prior: ReducedPrior, kind: Kind, plan: Plan, *, among: IntAr
 class _Posterior:
     """Information after a plan, the new poses eliminated; notation as above."""
 
-    def __init__(self, prior: ReducedPrior, kind: Kind, plan: Plan) -> None:
-        self.prior, self.kind, self.plan = prior, kind, plan
-        kappa, self.num_new = prior.tangent_dim, len(plan.closures)
-        self.touched = np.flatnonzero(plan.closures.any(axis=0))
-        number = plan.closures[:, self.touched]
+    def __init__(self, prior: ReducedPrior, kind: Kind, plan: Plan | Mixture) -> None:
+        self.prior, self.kind = prior, kind
+        mixture = alone(plan) if isinstance(plan, Plan) else plan
+        kappa, background = prior.tangent_dim, mixture.background
+        self.num_cells, self.shape = background.num_cells, background.closures.shape
+        source, target, odometry, number = _joined(mixture)
+        self.variables = np.unique(target)
+        count = len(self.variables)
+        number = number[self.variables]
+        self.touched = np.flatnonzero(number.any(axis=0))
+        number = number[:, self.touched]
         closures = prior.closures[self.touched]
-        weighted = number[:, :, None, None] * closures  # (T, m', kappa, kappa)
-        own, other = np.zeros((2, self.num_new, self.num_new, kappa, kappa))
-        at = np.arange(self.num_new)
-        own[at, at] = weighted.sum(axis=1) + plan.odometry
-        own[at[:-1], at[:-1]] += plan.odometry[1:]
-        other[at[1:], at[:-1]] = -plan.odometry[1:]
-        blocks = own + other + other.transpose(1, 0, 3, 2)
-        size, columns = self.num_new * kappa, len(self.touched) * kappa
-        self.root_new = np.linalg.cholesky(blocks.transpose(0, 2, 1, 3).reshape(size, size))
-        self.between = -weighted.transpose(0, 2, 1, 3).reshape(size, columns)
-        half = solve_triangular(self.root_new, self.between, lower=True, check_finite=False)
-        added = -half.T @ half
+        weighted = number[:, :, None, None] * closures  # (N, m', kappa, kappa)
+        head = np.searchsorted(self.variables, target)
+        inner = source >= 0
+        tail = np.searchsorted(self.variables, source[inner])
+        blocks = weighted.sum(axis=1)
+        np.add.at(blocks, head, odometry)
+        np.add.at(blocks, tail, odometry[inner])
+        at = np.arange(count)
+        rows, columns = np.concatenate([at, head[inner]]), np.concatenate([at, tail])
+        self.root_new = _banded_root(rows, columns, np.concatenate([blocks, -odometry[inner]]), count, kappa)
+        size = len(self.touched) * kappa
+        self.between = -weighted.transpose(0, 2, 1, 3).reshape(count * kappa, size)
+        self.lever = cho_solve_banded((self.root_new, True), self.between, check_finite=False)  # I_nn^-1 B
+        added = -self.between.T @ self.lever
+        added = (added + added.T) / 2
         diagonal = added.reshape(len(self.touched), kappa, len(self.touched), kappa)
         every = np.arange(len(self.touched))
         diagonal[every, :, every, :] += number.sum(axis=0)[:, None, None] * closures
@@ -113,7 +128,7 @@ class _Posterior:
             return float(np.vdot(self.effect, self.prior.kernel[np.ix_(self.index, self.index)]))
         result = float(np.log(np.diagonal(self.root_core[0])).sum())
         if self.kind == "joint":
-            result += float(np.log(np.diagonal(self.root_new)).sum())
+            result += float(np.log(self.root_new[0]).sum())
         return result
 
     def slopes(self, seen: IntArray) -> Slopes:
@@ -128,33 +143,88 @@ class _Posterior:
             inner = prior.kernel[np.ix_(self.index, self.index)]
             mixed = kernel - inner @ known
             among = mixed - (self.sigma @ self.effect) @ mixed  # Q_m',:
-            alone = _diagonal_blocks(prior.kernel, seen, kappa) - _products(known, kernel, kappa, twice=True)
-            alone += _products(known, inner @ known, kappa)
+            free = _diagonal_blocks(prior.kernel, seen, kappa) - _products(known, kernel, kappa, twice=True)
+            free += _products(known, inner @ known, kappa)
             scale = 1.0
         else:
             among = rows - self.sigma @ known  # P_m',:
-            alone = _diagonal_blocks(prior.sigma, seen, kappa) - _products(rows, known, kappa)
+            free = _diagonal_blocks(prior.sigma, seen, kappa) - _products(rows, known, kappa)
             scale = 0.5
-        lever = cho_solve((self.root_new, True), self.between, check_finite=False)  # I_nn^-1 B
-        cross = -lever @ among  # new poses with seen ones
-        new = lever @ among[:, own] @ lever.T
-        if self.kind == "joint":
-            new = new + cho_solve((self.root_new, True), np.eye(len(self.root_new)), check_finite=False)
-        count = self.num_new
-        new = new.reshape(count, kappa, count, kappa).transpose(0, 2, 1, 3)
-        cross = cross.reshape(count, kappa, len(seen), kappa)
-        at = np.arange(count)
-        each = new[at, at]
+        cross = -self.lever @ among  # new poses with seen ones
+        each, odometry = self._among_new(-cross[:, own])
+        cross = cross.reshape(len(self.variables), kappa, len(seen), kappa)
         weight = prior.closures[seen]
-        slope = np.einsum("jab,jab->j", weight, alone)[None, :] + np.tensordot(each, weight, axes=([1, 2], [1, 2]))
+        slope = np.einsum("jab,jab->j", weight, free)[None, :] + np.tensordot(each, weight, axes=([1, 2], [1, 2]))
         slope -= 2 * (cross.transpose(0, 2, 1, 3) * weight).sum(axis=(2, 3))
-        odometry = each.copy()
-        odometry[1:] += each[:-1] - new[at[1:], at[:-1]] - new[at[:-1], at[1:]]
-        if len(seen) == len(prior.closures):
-            return Slopes(scale * slope, scale * odometry)
-        full = np.zeros(self.plan.closures.shape)
-        full[:, seen] = scale * slope
+        full = np.zeros(self.shape)
+        full[np.ix_(self.variables, seen)] = scale * slope
         return Slopes(full, scale * odometry)
+
+    def _among_new(self, among: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """X of each new pose, shape (N, kappa, kappa); and what odometry from any cell to any other counts, as in `Slopes`."""
+        kappa, cells = self.prior.tangent_dim, self.num_cells
+        count = self.shape[0] // cells
+        inverse = None
+        if self.kind == "joint":
+            identity = np.eye(len(self.variables) * kappa)
+            inverse = cho_solve_banded((self.root_new, True), identity, check_finite=False)
+        begin: IntArray = np.searchsorted(self.variables, np.arange(count + 1) * cells)
+        each = np.zeros((len(self.variables), kappa, kappa))
+        odometry = np.zeros((count, cells, cells, kappa, kappa))
+        before = slice(0, 0)
+        for t in range(count):
+            here = slice(int(begin[t]), int(begin[t + 1]))
+            both = slice(before.start if t else here.start, here.stop)
+            flat, to = (slice(part.start * kappa, part.stop * kappa) for part in (here, both))
+            block = among[flat] @ self.lever[to].T
+            if inverse is not None:
+                block = block + inverse[flat, to]
+            block = block.reshape(here.stop - here.start, kappa, both.stop - both.start, kappa).transpose(0, 2, 1, 3)
+            mine = self.variables[here] - t * cells
+            older = both.stop - both.start - len(mine)
+            at = np.arange(len(mine))
+            each[here] = block[at, older + at]
+            part = np.broadcast_to(each[here][None], (cells, len(mine), kappa, kappa)).copy()
+            if older:
+                cross = block[:, :older].transpose(1, 0, 2, 3)
+                part[self.variables[before] - (t - 1) * cells] += each[before][:, None] - cross - cross.transpose(0, 1, 3, 2)
+            odometry[t][:, mine] = part
+            before = here
+        return each, odometry
+
+
+def _joined(mixture: Mixture) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+    """Odometry: variables that it joins, and information; and the closures of each variable, shape (T C, m)."""
+    background, cells = mixture.background, mixture.background.num_cells
+    number = (0.0 if mixture.only_used else mixture.share) * background.closures
+    sources, targets, odometry = list[IntArray](), list[IntArray](), list[FloatArray]()
+    for plan, weight in zip(mixture.plans, mixture.weights.tolist(), strict=True):
+        variables = np.arange(len(plan.closures)) * cells + plan.cells
+        number[variables] += weight * plan.closures
+        sources.append(np.concatenate([[-1], variables[:-1]])[: len(variables)])
+        targets.append(variables)
+        odometry.append(weight * plan.odometry)
+    kept = np.ones(len(background.source), dtype=bool)
+    if mixture.only_used:
+        used = np.zeros(len(number) + 1, dtype=bool)  # the last one, with index -1, is the pose where the robot is
+        used[np.concatenate([[-1], *targets])] = True
+        kept = used[background.source] & used[background.target]
+    sources.append(background.source[kept])
+    targets.append(background.target[kept])
+    odometry.append(mixture.share * background.odometry[kept])
+    return np.concatenate(sources), np.concatenate(targets), np.concatenate(odometry), number
+
+
+def _banded_root(rows: IntArray, columns: IntArray, blocks: FloatArray, count: int, kappa: int) -> FloatArray:
+    """Cholesky factor, as lower bands, of a symmetric matrix given by the blocks of its lower half; those in one place add."""
+    at = np.arange(kappa)
+    i = (rows[:, None, None] * kappa + at[:, None]) + np.zeros(kappa, np.int64)
+    j = (columns[:, None, None] * kappa + at) + np.zeros((kappa, 1), np.int64)
+    lower = i >= j
+    band = i[lower] - j[lower]
+    matrix = np.zeros((int(band.max(initial=0)) + 1, count * kappa))
+    np.add.at(matrix, (band, j[lower]), blocks[lower])
+    return cholesky_banded(matrix, lower=True, check_finite=False)
 
 
 def _root(covariance: FloatArray) -> FloatArray:

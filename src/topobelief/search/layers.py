@@ -6,6 +6,9 @@ in its layer s lies, of which a state knows an interval. So every walk is a path
 them are no walks: they take the lower layer too often, which saves up to delta a way. What a path is told of the length
 that it truly has (`Arcs.way`) lets whoever weighs arcs charge for it.
 
+Each piece of each way has a label, the cell of the plane in which it is. A state also knows the label of the pose that was
+dropped last, so that an arc knows from which cell to which the odometry of the poses that it drops leads.
+
 spacing = m delta. A way from layer k to layer k' drops the new poses t with k < t m <= k', the t-th on the piece t m - k of the
 way (`ways`), whatever s is. The last pose stands at the walk's end.
 """
@@ -19,23 +22,25 @@ import numpy as np
 from topobelief.arrays import BoolArray, FloatArray, IntArray
 from topobelief.linalg.block_cholesky import Int32Array
 from topobelief.linalg.compiled import compiled
-from topobelief.search.ways import Ways
+from topobelief.search.ways import Ways, first_pieces
 
 _TIE = 1e-9  # of a layer: lengths that differ by less are equal
 
 
 @dataclass(frozen=True, slots=True)
 class Records:
-    """New poses that arcs drop: number t = 1, 2, …, and the way and its piece (counted from 0) on which the pose stands."""
+    """New poses that arcs drop: number t = 1, 2, …, the way and its piece (counted from 0) on which the pose stands, and the
+    label of the pose before it (0 for the one where the robot is)."""
 
     number: Int32Array
     way: Int32Array
     piece: Int32Array
+    before: Int32Array
 
 
 @dataclass(frozen=True, slots=True)
 class Arcs:
-    """Arcs between states k V + v, those of lower layers first.
+    """Arcs between states k S + s at spot s of S, a vertex and a last label, and layer k; those of lower layers first.
 
     Attributes
     ----------
@@ -66,23 +71,36 @@ class Layers:
 
     Attributes
     ----------
-    num_vertices, num_layers
+    num_spots, num_layers
+        S: pairs of a vertex and a label that some walk has there.
+    num_labels
+        C.
     pieces_per_pose
         m.
+    first_vertex
     first_state
         Where walks begin.
     """
 
-    num_vertices: int
+    num_spots: int
     num_layers: int
+    num_labels: int
     pieces_per_pose: int
+    first_vertex: int
     first_state: int
     arcs: Arcs
     records: Records
 
 
 def build_layers(
-    ways: Ways, first_vertex: int, to_go: FloatArray, is_end: BoolArray, max_length: float, delta: float, pieces_per_pose: int
+    ways: Ways,
+    first_vertex: int,
+    to_go: FloatArray,
+    is_end: BoolArray,
+    max_length: float,
+    delta: float,
+    pieces_per_pose: int,
+    labels: Int32Array,
 ) -> Layers:
     """The layers of the walks from a vertex.
 
@@ -98,21 +116,59 @@ def build_layers(
     max_length
         Metres, counted from the first vertex.
     delta, pieces_per_pose
+    labels : shape (P,)
+        Of the pieces of all ways (`ways.first_pieces`), from 0 on.
     """
-    num_vertices = len(to_go)
+    num_vertices, num_labels = len(to_go), int(labels.max()) + 1
+    first = first_pieces(ways.lengths, delta)
+    since = _since_label(ways.source, ways.target, ways.lengths, labels, first, delta, num_vertices, num_labels, first_vertex)
+    vertex, label = np.nonzero(since <= delta * pieces_per_pose * (1 + 1e-6) + 1e-6)
+    spot = np.full((num_vertices, num_labels), -1)
+    spot[vertex, label] = np.arange(len(vertex))
     num_layers = int(np.floor(max_length / delta + 1e-6)) + 1
     order = np.argsort(ways.source, kind="stable")
     out = np.searchsorted(ways.source[order], np.arange(num_vertices + 1))
-    reach = (out, order, ways.target, ways.lengths, to_go)
-    nearest, furthest = _reached(*reach, first_vertex, num_layers, delta, max_length)
-    sizes = _arcs(*reach, is_end, nearest, furthest, delta, max_length, pieces_per_pose, first_vertex, False, *_room(0, 0))
+    reach = (out, order, ways.target, ways.lengths, to_go, labels, first, vertex, label, spot, pieces_per_pose)
+    begin = int(spot[first_vertex, 0])
+    nearest, furthest = _reached(*reach, begin, num_layers, delta, max_length)
+    sizes = _arcs(*reach, is_end, nearest, furthest, delta, max_length, begin, False, *_room(0, 0))
     arcs, records = _room(sizes[0], sizes[1])
-    _arcs(*reach, is_end, nearest, furthest, delta, max_length, pieces_per_pose, first_vertex, True, arcs, records)
-    return Layers(num_vertices, num_layers, pieces_per_pose, first_vertex, Arcs(*arcs), Records(*records))
+    _arcs(*reach, is_end, nearest, furthest, delta, max_length, begin, True, arcs, records)
+    return Layers(len(vertex), num_layers, num_labels, pieces_per_pose, first_vertex, begin, Arcs(*arcs), Records(*records))
 
 
 def _room(num_arcs: int, num_records: int) -> tuple[Int32Array, Int32Array]:
-    return np.empty((7, num_arcs), np.int32), np.empty((3, num_records), np.int32)
+    return np.empty((7, num_arcs), np.int32), np.empty((4, num_records), np.int32)
+
+
+@compiled
+def _since_label(
+    source: IntArray,
+    target: IntArray,
+    lengths: FloatArray,
+    labels: Int32Array,
+    first: IntArray,
+    delta: float,
+    num_vertices: int,
+    num_labels: int,
+    first_vertex: int,
+) -> FloatArray:
+    """Least metres driven since a piece with a label, shape (V, C); the first vertex has label 0."""
+    since = np.full((num_vertices, num_labels), np.inf)
+    since[first_vertex, 0] = 0.0
+    for e in range(len(lengths)):
+        for p in range(first[e], first[e + 1]):
+            left = max(lengths[e] - (p - first[e] + 1) * delta, 0.0)
+            since[target[e], labels[p]] = min(since[target[e], labels[p]], left)
+    again = True
+    while again:
+        again = False
+        for e in range(len(lengths)):
+            for c in range(num_labels):
+                if since[source[e], c] + lengths[e] < since[target[e], c]:
+                    since[target[e], c] = since[source[e], c] + lengths[e]
+                    again = True
+    return since
 
 
 @compiled
@@ -122,39 +178,47 @@ def _reached(
     target: IntArray,
     lengths: FloatArray,
     to_go: FloatArray,
-    first_vertex: int,
+    labels: Int32Array,
+    first: IntArray,
+    vertex: IntArray,
+    label: IntArray,
+    spots: IntArray,
+    m: int,
+    begin: int,
     num_layers: int,
     delta: float,
     max_length: float,
 ) -> tuple[FloatArray, FloatArray]:
-    """Least and largest length at which walks reach each state, shape (layers, V); inf and -inf for none."""
-    nearest, furthest = np.empty((num_layers, len(to_go))), np.empty((num_layers, len(to_go)))
-    for k in range(num_layers):
-        for v in range(len(to_go)):
-            nearest[k, v], furthest[k, v] = np.inf, -np.inf
-    nearest[0, first_vertex] = furthest[0, first_vertex] = 0.0
+    """Least and largest length at which walks reach each state, shape (layers, S); inf and -inf for none."""
+    num_spots = len(vertex)
+    nearest, furthest = np.full((num_layers, num_spots), np.inf), np.full((num_layers, num_spots), -np.inf)
+    nearest[0, begin] = furthest[0, begin] = 0.0
     for k in range(num_layers):
         again = True
         while again:
             again = False
-            for v in range(len(to_go)):
-                if nearest[k, v] == np.inf:
+            for spot in range(num_spots):
+                if nearest[k, spot] == np.inf:
                     continue
+                v, c = vertex[spot], label[spot]
                 for r in range(out[v], out[v + 1]):
                     e = order[r]
-                    w, low, high = target[e], nearest[k, v] + lengths[e], furthest[k, v] + lengths[e]
+                    w, low, high = target[e], nearest[k, spot] + lengths[e], furthest[k, spot] + lengths[e]
                     for q in range(int(low / delta + 1e-9), int(high / delta + 1e-9) + 1):
                         at = max(low, q * delta)
                         if q >= num_layers or not at + to_go[w] <= max_length * (1.0 + 1e-12) + 1e-9:
                             break
-                        if at < nearest[q, w]:
-                            again = again or (q == k and at < nearest[q, w] - 1e-12)
-                            nearest[q, w] = at
+                        to = spots[w, labels[first[e] + q // m * m - k - 1] if q // m > k // m else c]
+                        if to < 0:
+                            continue
+                        if at < nearest[q, to]:
+                            again = again or (q == k and at < nearest[q, to] - 1e-12)
+                            nearest[q, to] = at
                         upto = (q + 1 - 1e-8) * delta
                         upto = upto if q == k else min(high, upto)
-                        if upto > furthest[q, w]:
+                        if upto > furthest[q, to]:
                             again = again or q == k
-                            furthest[q, w] = upto
+                            furthest[q, to] = upto
     return nearest, furthest
 
 
@@ -165,24 +229,29 @@ def _arcs(
     target: IntArray,
     lengths: FloatArray,
     to_go: FloatArray,
+    labels: Int32Array,
+    first: IntArray,
+    vertex: IntArray,
+    label: IntArray,
+    spots: IntArray,
+    m: int,
     is_end: BoolArray,
     nearest: FloatArray,
     furthest: FloatArray,
     delta: float,
     max_length: float,
-    m: int,
-    first_vertex: int,
+    begin: int,
     fill: bool,
     arcs: Int32Array,
     records: Int32Array,
 ) -> tuple[int, int]:
     """Count the arcs and records, and put them into the tables if asked to."""
-    num_layers, num_vertices = nearest.shape
+    num_layers, num_spots = nearest.shape
     a = r = 0
-    if is_end[first_vertex]:
+    if is_end[vertex[begin]]:
         if fill:
             arcs[0, a], arcs[1, a], arcs[2, a], arcs[3, a], arcs[4, a], arcs[5, a], arcs[6, a] = (
-                first_vertex,
+                begin,
                 -1,
                 -1,
                 0,
@@ -192,26 +261,33 @@ def _arcs(
             )
         a += 1
     for k in range(num_layers):
-        for v in range(num_vertices):
-            if nearest[k, v] == np.inf:
+        for spot in range(num_spots):
+            if nearest[k, spot] == np.inf:
                 continue
+            v, c = vertex[spot], label[spot]
             for o in range(out[v], out[v + 1]):
                 e = order[o]
-                w, low, high = target[e], nearest[k, v] + lengths[e], furthest[k, v] + lengths[e]
+                w, low, high = target[e], nearest[k, spot] + lengths[e], furthest[k, spot] + lengths[e]
                 record, lowest = r, int(low / delta + 1e-9)
                 highest = min(int(high / delta + 1e-9), num_layers - 1)
                 while highest >= lowest and not max(low, highest * delta) + to_go[w] <= max_length * (1.0 + 1e-12) + 1e-9:
                     highest -= 1
                 if highest < lowest:
                     continue
+                before = c
                 for t in range(k // m + 1, highest // m + 1):
                     if fill:
-                        records[0, r], records[1, r], records[2, r] = t, e, t * m - k - 1
+                        records[0, r], records[1, r], records[2, r], records[3, r] = t, e, t * m - k - 1, before
+                    before = labels[first[e] + t * m - k - 1]
                     r += 1
                 for q in range(lowest, highest + 1):
                     count = q // m - k // m
+                    before = labels[first[e] + q // m * m - k - 1] if count else c
+                    to = spots[w, before]
+                    if to < 0:
+                        continue
                     if fill:
-                        arcs[0, a], arcs[1, a], arcs[2, a] = k * num_vertices + v, q * num_vertices + w, e
+                        arcs[0, a], arcs[1, a], arcs[2, a] = k * num_spots + spot, q * num_spots + to, e
                         arcs[3, a], arcs[4, a], arcs[5, a], arcs[6, a] = record, count, -1, -1
                     a += 1
                     if not is_end[w] or not max(low, q * delta) <= max_length * (1.0 + 1e-12) + 1e-9:
@@ -219,15 +295,15 @@ def _arcs(
                     tie = q * delta + 1e-9 * m * delta
                     if q % m == 0 and low <= tie:  # the walk ends where its last pose was dropped
                         if fill:
-                            arcs[0, a], arcs[1, a], arcs[2, a] = k * num_vertices + v, -1, e
+                            arcs[0, a], arcs[1, a], arcs[2, a] = k * num_spots + spot, -1, e
                             arcs[3, a], arcs[4, a], arcs[5, a], arcs[6, a] = record, count, -1, q // m
                         a += 1
                     if q % m == 0 and high <= tie:
                         continue
                     if fill:
-                        records[0, r], records[1, r] = q // m + 1, e
+                        records[0, r], records[1, r], records[3, r] = q // m + 1, e, before
                         records[2, r] = int(np.ceil(lengths[e] / delta - 1e-9))
-                        arcs[0, a], arcs[1, a], arcs[2, a] = k * num_vertices + v, -1, e
+                        arcs[0, a], arcs[1, a], arcs[2, a] = k * num_spots + spot, -1, e
                         arcs[3, a], arcs[4, a], arcs[5, a], arcs[6, a] = record, count, r, q // m + 1
                     r += 1
                     a += 1
@@ -266,9 +342,9 @@ def longest_path(layers: Layers, which: Int32Array, weights: FloatArray, charge:
     charge : shape (E,)
         To be taken off the weight of arcs along each way, at least 0.
     """
-    arcs, num_vertices, num_layers = layers.arcs, layers.num_vertices, layers.num_layers
+    arcs, num_spots, num_layers = layers.arcs, layers.num_spots, layers.num_layers
     tables = (which, arcs.source, arcs.target, arcs.way, weights, charge)
-    ahead, before, value, last = _forward(*tables, num_vertices, num_layers, layers.first_state)
+    ahead, before, value, last = _forward(*tables, num_spots, num_layers, layers.first_state)
     path: list[int] = []
     while last >= 0:
         path.append(int(last))
@@ -289,9 +365,9 @@ def arcs_above(
         What that found.
     threshold
     """
-    arcs, num_vertices, num_layers = layers.arcs, layers.num_vertices, layers.num_layers
+    arcs, num_spots, num_layers = layers.arcs, layers.num_spots, layers.num_layers
     tables = (which, arcs.source, arcs.target, arcs.way, weights, charge)
-    return which[_on_long_paths(*tables, num_vertices, num_layers, ahead, threshold)]
+    return which[_on_long_paths(*tables, num_spots, num_layers, ahead, threshold)]
 
 
 @compiled
@@ -302,18 +378,18 @@ def _forward(
     way: Int32Array,
     weights: FloatArray,
     charge: FloatArray,
-    num_vertices: int,
+    num_spots: int,
     num_layers: int,
     first_state: int,
 ) -> tuple[FloatArray, Int32Array, float, int]:
-    num_states = num_vertices * num_layers
+    num_states = num_spots * num_layers
     best, before = np.empty(num_states), np.empty(num_states, np.int32)
     for s in range(num_states):
         best[s], before[s] = -np.inf, -1
     best[first_state] = 0.0
     value, last, begin = -np.inf, -1, 0
     for k in range(num_layers):
-        top = (k + 1) * num_vertices
+        top = (k + 1) * num_spots
         end, inner = begin, False
         while end < len(which) and source[which[end]] < top:
             inner = inner or 0 <= target[which[end]] < top
@@ -350,18 +426,18 @@ def _on_long_paths(
     way: Int32Array,
     weights: FloatArray,
     charge: FloatArray,
-    num_vertices: int,
+    num_spots: int,
     num_layers: int,
     ahead: FloatArray,
     threshold: float,
 ) -> BoolArray:
     """Dynamic programming backwards, and which arcs lie on paths that are long enough."""
-    best, kept = np.empty(num_vertices * num_layers), np.zeros(len(which), np.bool_)
+    best, kept = np.empty(num_spots * num_layers), np.zeros(len(which), np.bool_)
     for s in range(len(best)):
         best[s] = -np.inf
     end = len(which)
     for k in range(num_layers - 1, -1, -1):
-        floor, top = k * num_vertices, (k + 1) * num_vertices
+        floor, top = k * num_spots, (k + 1) * num_spots
         begin, inner = end, False
         while begin > 0 and source[which[begin - 1]] >= floor:
             begin -= 1

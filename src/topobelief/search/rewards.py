@@ -22,7 +22,7 @@ from topobelief.linalg.block_cholesky import Int32Array
 from topobelief.linalg.compiled import compiled
 from topobelief.search.information_gain import Slopes
 from topobelief.search.layers import Arcs, Layers
-from topobelief.search.plans import Plan
+from topobelief.search.plans import Background, Plan
 from topobelief.search.reduced_prior import world_to_body
 from topobelief.search.ways import Sightings, Ways
 
@@ -55,7 +55,7 @@ class Rewards:
     powers : shape (3, E, kappa, kappa)
         Coefficients of V(u) along each way.
     idle : shape (kappa, kappa)
-        Odometry of idle poses.
+        Odometry of idle poses; 0 where they do not count. Where they do, there is one cell.
     earliest : shape (m,)
         The first new pose that may close a loop with each seen pose.
     most
@@ -66,6 +66,8 @@ class Rewards:
         Metres that count as length, along each way.
     prices : shape (E,)
         What driving each way costs, in the unit of the objective.
+    cells : shape (P,)
+        Of each piece, from 0 on.
     """
 
     layers: Layers
@@ -79,15 +81,16 @@ class Rewards:
     num_new: int
     driven: FloatArray
     prices: FloatArray
+    cells: Int32Array
 
     def of_records(self, slopes: Slopes, used: Int32Array) -> FloatArray:
         """Worth of some records, in a table of all of them."""
         worth = np.empty(len(self.layers.records.number))
-        on_ways = np.einsum("tab,ceab->cte", slopes.odometry, self.powers)
         sightings, records = self.sightings, self.layers.records
         _value_records(
-            used, records.number, records.way, records.piece, self.ways.lengths, self.delta, on_ways, slopes.closures,
-            sightings.first, sightings.start, sightings.poses, self.earliest, self.most, worth,
+            used, records.number, records.way, records.piece, records.before, self.cells, self.ways.lengths, self.delta,
+            slopes.odometry, self.powers, slopes.closures, sightings.first, sightings.start, sightings.poses, self.earliest,
+            self.most, worth,
         )  # fmt: skip
         return worth
 
@@ -105,7 +108,7 @@ class Rewards:
         at_end : shape (T + 1,)
             What ends a walk after each number of poses.
         """
-        idle = np.einsum("tab,ab->t", slopes.odometry, self.idle)
+        idle = np.einsum("tab,ab->t", slopes.odometry[:, 0, 0], self.idle)
         remaining = np.concatenate([np.cumsum(idle[::-1])[::-1], np.zeros(1)])
         arcs, charge = self.layers.arcs, price * self.prices
         return _value_arcs(which, arcs.way, arcs.record, arcs.count, arcs.end, arcs.last, worth, charge, remaining + at_end)
@@ -119,25 +122,46 @@ class Rewards:
             if arcs.end[arc] >= 0:
                 taken.append(int(arcs.end[arc]))
         records = np.array(taken, dtype=np.int64)
-        closures = np.zeros(slopes.closures.shape)
-        odometry = np.broadcast_to(self.idle, slopes.odometry.shape).copy()
+        num_poses = int(arcs.last[path[-1]])
+        count = self.num_new if self.idle.any() else num_poses
+        closures = np.zeros((count, slopes.closures.shape[1]))
+        odometry = np.broadcast_to(self.idle, (count, *self.idle.shape)).copy()
+        cells = np.zeros(count, dtype=np.int64)
         sightings = self.sightings
         for record in taken:
             t, e, piece = (int(column[record]) for column in (layers.records.number, layers.records.way, layers.records.piece))
             place = int(sightings.first[e]) + piece
+            before, cell = int(layers.records.before[record]), int(self.cells[place])
             seen = sightings.poses[sightings.start[place] : sightings.start[place + 1]]
             seen = seen[self.earliest[seen] <= t]
             if self.most and len(seen) > self.most:
-                seen = seen[np.argsort(-slopes.closures[t - 1, seen], kind="stable")[: self.most]]
+                slope = slopes.closures[(t - 1) * layers.num_labels + cell, seen]
+                seen = seen[np.argsort(-slope, kind="stable")[: self.most]]
             closures[t - 1, seen] = 1.0
             ends = np.array(self._odometry_at(e, piece))
-            odometry[t - 1] = ends[np.argmax(np.tensordot(ends, slopes.odometry[t - 1], 2))]
+            odometry[t - 1] = ends[np.argmax(np.tensordot(ends, slopes.odometry[t - 1, before, cell], 2))]
+            cells[t - 1] = cell
         ways = arcs.way[path]
         ways = ways[ways >= 0]
-        plan = Plan(
-            closures, odometry, float(arcs.last[path[-1]]), float(self.driven[ways].sum()), float(self.prices[ways].sum())
-        )
+        length, cost = float(self.driven[ways].sum()), float(self.prices[ways].sum())
+        plan = Plan(closures, odometry, float(num_poses), length, cost, cells)
         return Course(path, records, plan)
+
+    def background(self) -> Background:
+        """The mean of what the records of each pose in each cell add, and of the odometry from each cell to each other."""
+        layers, sightings = self.layers, self.sightings
+        records, cells = layers.records, layers.num_labels
+        shape = (self.num_new * cells, len(self.earliest))
+        closures, links = np.zeros(shape), np.zeros((self.num_new, cells, cells, *self.idle.shape))
+        _add_records(
+            records.number, records.way, records.piece, records.before, self.cells, sightings.first, sightings.start,
+            sightings.poses, self.earliest, self.powers[0], closures, links,
+        )  # fmt: skip
+        if self.idle.any():
+            links[:] += self.idle
+        t, before, cell = np.nonzero(links.any(axis=(3, 4)))
+        source = np.where(t > 0, (t - 1) * cells + before, -1)
+        return Background(cells, closures, source, t * cells + cell, links[t, before, cell])
 
     def _odometry_at(self, way: int, piece: int) -> list[FloatArray]:
         length = float(self.ways.lengths[way])
@@ -206,9 +230,12 @@ def _value_records(
     number: Int32Array,
     way: Int32Array,
     piece: Int32Array,
+    before: Int32Array,
+    cells: Int32Array,
     lengths: FloatArray,
     delta: float,
-    on_ways: FloatArray,
+    odometry: FloatArray,
+    powers: FloatArray,
     closures: FloatArray,
     first: IntArray,
     start: IntArray,
@@ -219,6 +246,7 @@ def _value_records(
 ) -> None:
     """Worth of the records used: closures, and odometry at the better end of the piece."""
     largest = np.zeros(most + 1)
+    kappa = odometry.shape[3]
     for r in used:
         t, e = number[r] - 1, way[r]
         p = first[e] + piece[r]
@@ -226,18 +254,26 @@ def _value_records(
         end = min((piece[r] + 1) * delta, lengths[e])
         if p == first[e + 1] - 1:
             begin = lengths[e]
-        constant, linear, square = on_ways[0, t, e], on_ways[1, t, e], on_ways[2, t, e]
+        cell = cells[p]
+        constant = linear = square = 0.0
+        for i in range(kappa):
+            for j in range(kappa):
+                slope = odometry[t, before[r], cell, i, j]
+                constant += slope * powers[0, e, i, j]
+                linear += slope * powers[1, e, i, j]
+                square += slope * powers[2, e, i, j]
+        row = t * odometry.shape[1] + cell
         value = max(constant + begin * (linear + begin * square), constant + end * (linear + end * square))
         if most == 0:
             for q in range(start[p], start[p + 1]):
                 if earliest[poses[q]] <= number[r]:
-                    value += closures[t, poses[q]]
+                    value += closures[row, poses[q]]
         else:
             for c in range(most):
                 largest[c] = 0.0
             for q in range(start[p], start[p + 1]):
                 if earliest[poses[q]] <= number[r]:
-                    slope, c = closures[t, poses[q]], most - 1
+                    slope, c = closures[row, poses[q]], most - 1
                     if slope > largest[c]:
                         while c > 0 and largest[c - 1] < slope:
                             largest[c] = largest[c - 1]
@@ -246,6 +282,41 @@ def _value_records(
             for c in range(most):
                 value += largest[c]
         worth[r] = value
+
+
+@compiled
+def _add_records(
+    number: Int32Array,
+    way: Int32Array,
+    piece: Int32Array,
+    before: Int32Array,
+    cells: Int32Array,
+    first: IntArray,
+    start: IntArray,
+    poses: IntArray,
+    earliest: IntArray,
+    odometry: FloatArray,
+    closures: FloatArray,
+    links: FloatArray,
+) -> None:
+    """Means of the closures of each pose in each cell, and of the odometry between cells, into tables of zeros."""
+    num_cells = links.shape[1]
+    count, times = np.zeros(len(closures)), np.zeros(links.shape[:3])
+    for r in range(len(number)):
+        t, p = number[r] - 1, first[way[r]] + piece[r]
+        row = t * num_cells + cells[p]
+        for q in range(start[p], start[p + 1]):
+            if earliest[poses[q]] <= number[r]:
+                closures[row, poses[q]] += 1.0
+        links[t, before[r], cells[p]] += odometry[way[r]]
+        count[row] += 1.0
+        times[t, before[r], cells[p]] += 1.0
+    for row in range(len(count)):
+        closures[row] /= max(count[row], 1.0)
+    for t in range(links.shape[0]):
+        for i in range(num_cells):
+            for j in range(num_cells):
+                links[t, i, j] /= max(times[t, i, j], 1.0)
 
 
 @compiled

@@ -17,6 +17,7 @@ from scipy.spatial import KDTree
 from topobelief.arrays import BoolArray, FloatArray, IntArray
 from topobelief.candidates.polyline import distances_to_segments
 from topobelief.graph.pose_graph import PoseGraph
+from topobelief.linalg.block_cholesky import Int32Array
 from topobelief.linalg.compiled import compiled
 from topobelief.search.bound import ClosureRule
 from topobelief.world import World
@@ -80,6 +81,23 @@ class Sightings:
     seen: IntArray
 
 
+def first_pieces(lengths: FloatArray, delta: float) -> IntArray:
+    """Number of the first piece of each way, and how many there are, shape (E + 1,); the end of a way is one more piece."""
+    pieces = np.ceil(lengths / delta - _ROUNDING).astype(np.int64)
+    return np.concatenate([np.zeros(1, np.int64), np.cumsum(pieces + 1)])
+
+
+def cells_of_pieces(ways: Ways, delta: float, cell: float) -> Int32Array:
+    """Label of the square of the plane in which the middle of each piece is, from 0 on, shape (P,)."""
+    first = first_pieces(ways.lengths, delta)
+    way = np.repeat(np.arange(len(ways.lengths)), np.diff(first))
+    piece: IntArray = np.arange(int(first[-1])) - first[way]
+    middle = np.minimum((piece + 0.5) * delta, ways.lengths[way])
+    places = ways.begin[way] + (middle / ways.lengths[way])[:, None] * (ways.end - ways.begin)[way]
+    squares = np.floor((places - places.min(axis=0)) / cell).astype(np.int64)
+    return np.unique(squares, axis=0, return_inverse=True)[1].ravel().astype(np.int32)
+
+
 def find_sightings(
     graph: PoseGraph, ways: Ways, pose: int, delta: float, rule: ClosureRule, world: World | None, latest: int
 ) -> Sightings:
@@ -99,8 +117,7 @@ def find_sightings(
         The largest number of a new pose; poses that are not far enough back even for it are left out.
     """
     way, seen, lower, upper, squared_height = _seen_along(graph, ways, pose, rule, world, latest)
-    pieces = np.ceil(ways.lengths / delta - _ROUNDING).astype(np.int64)
-    first = np.concatenate([[0], np.cumsum(pieces + 1)])
+    first = first_pieces(ways.lengths, delta)
     offset = graph.positions[seen, :2] - ways.begin[way]
     along = (ways.end - ways.begin)[way] / ways.lengths[way, None]
     at = np.sum(offset * along, axis=1)
