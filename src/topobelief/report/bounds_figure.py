@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from topobelief.arrays import FloatArray
 from topobelief.planning.decision import Decision
+from topobelief.planning.registry import SIGNATURE_WORDS
 from topobelief.planning.units import quantity, shown_factor, shown_unit
 from topobelief.report import style
 from topobelief.report.canvas import Align, Canvas, Entry, Panel
@@ -164,7 +165,7 @@ def _title(decision: Decision) -> str:
 def _subtitle(decision: Decision) -> str:
     if decision.num_actions == 1:
         return "there is nothing to compare it with"
-    ranked = f"in the order of {style.SIGNATURES.get(decision.signature, decision.signature)}, best first"
+    ranked = f"in the order of {SIGNATURE_WORDS.get(decision.signature, decision.signature)}, best first"
     if decision.margin_met is not None:
         return f"{ranked}; the margin is {'met' if decision.margin_met else 'missed'}"
     if decision.proven_optimal:
