@@ -26,7 +26,7 @@ from topobelief.io.floor_plan import read_world
 from topobelief.io.formats import read_pose_graph
 from topobelief.io.ros_map import Unknown
 from topobelief.io.yaml_fields import Field, read_fields
-from topobelief.planning.registry import AUTO, BOUNDS, OBJECTIVES
+from topobelief.planning.registry import AUTO, BOUNDS, FAMILIES, OBJECTIVES, chosen
 from topobelief.strategies.registry import STRATEGIES
 from topobelief.world import World
 
@@ -152,6 +152,12 @@ def read_specification(path: StrPath) -> Specification:
     objectives = ("joint",)
     if "objectives" in fields:
         objectives = _several(fields["objectives"], lambda item: item.choice(OBJECTIVES))
+    rule = _rule(fields["rule"]) if "rule" in fields else Rule()
+    for objective in objectives:
+        families = (*FAMILIES[chosen(OBJECTIVES, objective).argument], AUTO)
+        if rule.bounds not in families:
+            bounds = fields["rule"].entries()["bounds"]
+            bounds.refuse(f'bounds that the objective "{objective}" has, one of {", ".join(families)}', repr(rule.bounds))
     return Specification(
         worlds=worlds,
         sessions=sessions,
@@ -159,7 +165,7 @@ def read_specification(path: StrPath) -> Specification:
         strategies=_several(fields["strategies"], lambda item: item.choice(STRATEGIES)),
         objectives=objectives,
         seeds=_seeds(fields["seeds"]),
-        rule=_rule(fields["rule"]) if "rule" in fields else Rule(),
+        rule=rule,
     )
 
 
