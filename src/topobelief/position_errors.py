@@ -12,20 +12,17 @@ see. Neither depends on which pose is held when the information matrix is invert
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib.util import find_spec
 
 import numpy as np
 
-from topobelief.arrays import FloatArray, IntArray
+from topobelief.arrays import FloatArray
 from topobelief.graph.action import Action, posterior
 from topobelief.graph.alignment import DEFAULT_SAMPLE_SIZE, Alignment, checked_sample_size
 from topobelief.graph.fisher import fisher_rows
 from topobelief.graph.fit import warn_of_misfit
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg.estimate import Estimate
-from topobelief.linalg.inverse import InverseSolver
-
-_COMPILED_SIZE = 6000  # variables beyond which loading compiled kernels is worth its time
+from topobelief.linalg.inverse_traces import inverse_traces
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,8 +90,10 @@ def expected_errors(
     kappa = graph.tangent_dim
     goal = after.num_poses - 1
     ends = np.unique([0, goal])
-    square, variance = _traces(
-        after, [(alignment.nodes, alignment.columns(kappa)), (ends, _relative_position(after, goal)[: len(ends)])]
+    square, variance = inverse_traces(
+        fisher_rows(after).joint(),
+        after.num_poses,
+        [(alignment.nodes, alignment.columns(kappa)), (ends, _relative_position(after, goal)[: len(ends)])],
     )
     map_rmse = (1 / alignment.count * square).root().known_length("expected error of the map")
     goal_std = variance.root().known_length("standard deviation of the last pose") if goal else Estimate(0.0, 0.0)
@@ -109,20 +108,3 @@ def _relative_position(graph: PoseGraph, goal: int) -> FloatArray:
     lever = graph.group.lever(graph.positions[goal : goal + 1] - graph.positions[:1])[0]
     columns[0, :k], columns[0, k:], columns[1, :k] = -np.eye(k), lever.T, np.eye(k)
     return columns
-
-
-def _traces(graph: PoseGraph, wanted: list[tuple[IntArray, FloatArray]]) -> list[Estimate[float]]:
-    """tr(A^T I^-1 A) for columns A given at some poses."""
-    if graph.num_poses * graph.tangent_dim > _COMPILED_SIZE and find_spec("numba") is not None:
-        from topobelief.forms.prior_factors import PriorFactors
-        from topobelief.linalg.solutions import inverse_trace
-
-        factor = PriorFactors(graph, graph.num_poses - 1).factor("joint", 0.0)
-        return [inverse_trace(factor, nodes, columns) for nodes, columns in wanted]
-    form = fisher_rows(graph).joint()
-    solver, traces = InverseSolver(graph.edges, graph.num_poses, form.strongest_node()), list[Estimate[float]]()
-    for nodes, columns in wanted:
-        dense = np.zeros((graph.num_poses, *columns.shape[1:]))
-        dense[nodes] = columns
-        traces.append(solver.solve(form, dense).trace)
-    return traces

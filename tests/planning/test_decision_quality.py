@@ -173,3 +173,8 @@ def test_rank_correlation_of_a_constant_is_nan():
 def test_bad_input_is_refused(J, s, message):
     with pytest.raises(InvalidInputError, match=message):
         decision_quality(J, s)
+
+
+def test_the_unit_is_told_where_it_is_known():
+    assert repr(decision_quality([1.0, 2.0], [0.0, 1.0])).startswith("DecisionQuality(error 1, gamma 1, ")
+    assert "error 1 m, gamma 1 m" in repr(decision_quality([1.0, 2.0], [0.0, 1.0], unit="m"))

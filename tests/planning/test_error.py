@@ -15,13 +15,15 @@ from engines import DenseEngine, judge
 from graphs import NOISES, SE2_GROUP, SE3_GROUP, Noise, random_action, random_pose_graph, sessions
 from references import error_reference
 from topobelief.errors import IllConditionedError, InvalidInputError
+from topobelief.forms import increments
 from topobelief.graph.action import Action, posterior
 from topobelief.graph.alignment import sample_of
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.graph.topology import Topology
 from topobelief.io.g2o import read_g2o
+from topobelief.linalg import inverse_traces
 from topobelief.planning.decision import Decision
-from topobelief.planning.engine import ScratchEngine
+from topobelief.planning.engine import Engine, ScratchEngine
 from topobelief.planning.incremental_engine import IncrementalEngine
 from topobelief.planning.planner import Planner
 from topobelief.position_errors import expected_errors
@@ -32,6 +34,7 @@ MODERATE = {"log_ratio": (-2.0, 1.0)}
 ERROR = {"objective": "error", "signature": "resistance"}
 seeds = st.integers(0, 2**32 - 1)
 samples = st.sampled_from([500, 4])
+from_scratch = Engine.from_scratch
 
 
 def a_session(seed, *, group=SE2_GROUP, kind="equal", num_poses=30, num_actions=10):
@@ -237,6 +240,39 @@ def test_exact_values_come_with_bounds_by_increments():
     batch = judge(graph, **ERROR).batch(actions)
     batch.bounds()
     assert batch.knows_entropies
+
+
+def test_a_decision_by_exact_values_says_so_and_keeps_them():
+    graph, actions = a_session(10)
+    planner = Planner(graph, engine="incremental", **ERROR)
+    decision = planner.decide(actions)
+    np.testing.assert_array_equal(decision.entropies, planner.entropies(actions))
+    assert decision.num_evaluations == len(actions)
+    assert decision.exact_bounds
+    assert decision.proven_optimal
+    assert decision.best == np.argmin(decision.entropies + [action.cost for action in actions])
+    assert "The exact values of all 10 were computed, since they cost no more than bounds." in decision.summary()
+    assert Decision.from_dict(decision.to_dict()).exact_bounds
+    one = planner.decide(actions, margin=1e3)
+    assert np.isfinite(one.entropies).sum() == one.num_evaluations == 1
+    assert not one.exact_bounds
+
+
+def test_after_many_closures_a_large_graph_is_factored_anew(monkeypatch):
+    graph, actions = a_session(12)
+    n, rng = graph.num_poses, np.random.default_rng(0)
+    many = Action([], rng.permuted(np.tile(np.arange(n), (20, 1)), axis=1)[:, :2], graph.information[0])
+    alone = Planner(graph, engine="scratch", **ERROR)
+    expected, signatures = alone.entropies([*actions, many]), alone.decide([*actions, many], proof="none").signatures
+    evaluated = []
+    monkeypatch.setattr(Engine, "from_scratch", lambda self, action: evaluated.append(action) or from_scratch(self, action))
+    for module in (increments, inverse_traces):
+        monkeypatch.setattr(module, "COMPILED_SIZE", 10)
+    monkeypatch.setattr(increments, "_LEAST_HEAVY", 0)
+    found = Planner(graph, engine="incremental", **ERROR).decide([*actions, many])
+    assert evaluated == [many]
+    np.testing.assert_allclose(found.entropies, expected, rtol=1e-9)
+    np.testing.assert_allclose(found.signatures, signatures, rtol=1e-9)
 
 
 def test_an_action_beyond_double_precision_is_named():

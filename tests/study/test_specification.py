@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -99,4 +101,14 @@ def test_a_graph_in_space_is_refused(specification_file):
     write_g2o(graph, specification_file.with_name("flight.g2o"))
     specification_file.write_text(specification_file.read_text().replace("start: [1, 1], goals", "graph: flight.g2o, goals"))
     with pytest.raises(FileError, match=r"flight\.g2o: expected a graph in SE\(2\)"):
+        read_specification(specification_file)
+
+
+@pytest.mark.parametrize("family", ["paper", "fischer_step"])
+def test_bounds_that_an_objective_does_not_have_are_refused(specification_file, family):
+    text = specification_file.read_text().replace("[joint]", "[joint, error]").replace("rule: {", f"rule: {{bounds: {family}, ")
+    specification_file.write_text(text)
+    families = "one of fischer, anchored, chain, auto"
+    message = f"study.yaml:11: rule.bounds: expected bounds that the objective \"error\" has, {families}, got '{family}'"
+    with pytest.raises(FileError, match=re.escape(message)):
         read_specification(specification_file)

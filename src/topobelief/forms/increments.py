@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from topobelief.arrays import FloatArray
+from topobelief.arrays import BoolArray, FloatArray
 from topobelief.forms.action_batch import ActionBatch
 from topobelief.forms.prior_factors import PriorFactors, SolvedName, form_of
 from topobelief.forms.protocol import ClosureForms, FormName, Forms, Part, PositionsName, RotationsName, Rows
@@ -17,6 +17,7 @@ from topobelief.graph.topology import Topology
 from topobelief.linalg.elimination_paths import FormFactor
 from topobelief.linalg.estimate import UNIT_ROUNDOFF, Estimate
 from topobelief.linalg.increments import Increments, Wanted, diagonal_increments, log_det_increments
+from topobelief.linalg.inverse_traces import COMPILED_SIZE
 
 _LARGEST_ERROR = 1.0  # nats; a factor with a larger error is not used
 _QR_SIZE = 1200  # up to here an evaluation from scratch may do better, by QR, than a factor
@@ -25,6 +26,7 @@ _QR_RELATIVE_ERROR = 1e-8  # of a trace; the same
 _LARGEST_RELATIVE_ERROR = 0.02
 _GAIN_ERRORS = 3.0  # I + R enters once, what is seen of the solutions twice
 _OPERATIONS = 64
+_LEAST_HEAVY = 400  # rows of closures up to which increments of a trace cost less than anything else
 
 
 class IncrementalForms(Forms[FloatArray], ClosureForms[FloatArray]):
@@ -134,13 +136,21 @@ class IncrementalForms(Forms[FloatArray], ClosureForms[FloatArray]):
         return form in self._traced
 
     def _trace(self, name: SolvedName) -> Estimate[FloatArray]:
-        """The prior's trace less what closures gain. Both are known relative to the errors of M and of I + R."""
-        prior, trusted, factor = self._prior.solutions(name), self._trusted(name, 0.0), self._prior.factor(name, 0.0)
+        """The prior's trace less what closures gain; nan after actions for which that is not worth its time.
+
+        Both are known relative to the errors of M and of I + R.
+        """
+        factor = self._prior.factor(name, 0.0)
+        light = self._light(factor)
+        if not light.any():
+            return Estimate(np.full(self._batch.count, np.nan), np.full(self._batch.count, np.inf))
+        prior, trusted = self._prior.solutions(name), self._trusted(name, 0.0)
         if name not in self._traced:
             self._traced[name] = log_det_increments(
-                factor, self._batch.extensions, form_of(name, self._batch), solutions=prior.values
+                factor, self._batch.extensions, form_of(name, self._batch), solutions=prior.values, wanted_of=light
             )
-            self._known.setdefault((name, 0.0, "closures"), self._traced[name])
+            if light.all():
+                self._known.setdefault((name, 0.0, "closures"), self._traced[name])
         added, trace = self._traced[name], prior.trace
         relative = trusted.error + _GAIN_ERRORS * added.error + _OPERATIONS * UNIT_ROUNDOFF
         value = trace.value - added.gains
@@ -148,6 +158,15 @@ class IncrementalForms(Forms[FloatArray], ClosureForms[FloatArray]):
         limit = _QR_RELATIVE_ERROR if _is_small(factor) else _LARGEST_RELATIVE_ERROR
         known = math.isfinite(trusted.value) & (error <= limit * value)
         return 1 / self._prior.alignment.count * Estimate(np.where(known, value, np.nan), error)
+
+    def _light(self, factor: FormFactor) -> BoolArray:
+        """Actions after which a trace costs less by increments than by a new factor of a large graph, shape (K,).
+
+        A solution costs m^2 with the dense factor of m rows of closures, and as much as there are entries in that of the graph.
+        """
+        rows = factor.block_size * np.array([action.num_closures for action in self._batch.actions])
+        small = factor.tree.num_free * factor.block_size <= COMPILED_SIZE
+        return small | (rows**2 <= max(_LEAST_HEAVY**2, len(factor.tree.rows) * factor.block_size**2))
 
     @property
     def increments(self) -> IncrementalForms:

@@ -18,6 +18,7 @@ from topobelief.graph.pose_graph import PoseGraph
 from topobelief.graph.topology import Topology
 from topobelief.linalg import EdgeForm, Estimate, LogDetSolver, laplacian_form
 from topobelief.linalg.inverse import InverseSolver, Solutions
+from topobelief.linalg.inverse_traces import inverse_traces
 from topobelief.linalg.shear import moved_rotations, sheared_log_det
 
 _RATIO_SAFETY = 4.0  # the directions that were looked at may not contain the worst one
@@ -53,7 +54,7 @@ class GraphForms(Forms[float]):
         self._prior, self._prior_rows = graph if prior is None else prior, prior_rows
         self._solvers: dict[int, LogDetSolver] = {}
         self._known: dict[tuple[FormName, float, Part], Estimate[float]] = {}
-        self._solved: dict[PositionsName, tuple[FloatArray, Solutions]] = {}
+        self._traces: dict[PositionsName, Estimate[float]] = {}
 
     @property
     def tangent_dim(self) -> int:
@@ -105,11 +106,20 @@ class GraphForms(Forms[float]):
         return mean_resistance(laplacian, self.graph.num_poses, sample_of(self.num_existing, self._sample_size))
 
     def aligned_trace(self, form: PositionsName) -> Estimate[float]:
-        return 1 / self._alignment.count * self._solutions(form)[1].trace
+        if form not in self._traces:
+            self._traces[form] = 1 / self._alignment.count * self._aligned(form)
+        return self._traces[form]
+
+    def _aligned(self, name: PositionsName) -> Estimate[float]:
+        if name == "positions":
+            return self._positions[1].trace
+        form, alignment = _blocks(self._rows, name), self._alignment
+        [trace] = inverse_traces(form, self.graph.num_poses, [(alignment.nodes, alignment.columns(form.block_size))])
+        return trace
 
     def coupled_trace(self, rotations: RotationsName) -> Estimate[float]:
         """Errors: that of K by itself; that of I_pp moves N^T Pi by up to sqrt(c) times as much, c the largest ratio seen."""
-        columns, along = self._solutions("positions")
+        columns, along = self._positions
         moved = moved_rotations(self._rows.joint(), self.split[0], along.values)
         solver = InverseSolver(self.graph.edges, self.graph.num_poses, self.anchor)
         found = solver.solve(_blocks(self._rows, rotations), moved)
@@ -124,17 +134,16 @@ class GraphForms(Forms[float]):
         return (form, 0.0, "all") in self._known
 
     def knows_trace(self, form: PositionsName) -> bool:
-        return form in self._solved
+        return form in self._traces
 
-    def _solutions(self, name: PositionsName) -> tuple[FloatArray, Solutions]:
-        """Columns Pi on all poses, and what M^-1 makes of them."""
-        if name not in self._solved:
-            form = _blocks(self._rows, name)
-            columns = np.zeros((self.graph.num_poses, form.block_size, self._alignment.count * self.split[0]))
-            columns[self._alignment.nodes] = self._alignment.columns(form.block_size)
-            solver = InverseSolver(self.graph.edges, self.graph.num_poses, form.strongest_node())
-            self._solved[name] = columns, solver.solve(form, columns)
-        return self._solved[name]
+    @cached_property
+    def _positions(self) -> tuple[FloatArray, Solutions]:
+        """Columns Pi on all poses, and what I_pp^-1 makes of them."""
+        form = _blocks(self._rows, "positions")
+        columns = np.zeros((self.graph.num_poses, form.block_size, self._alignment.count * self.split[0]))
+        columns[self._alignment.nodes] = self._alignment.columns(form.block_size)
+        solver = InverseSolver(self.graph.edges, self.graph.num_poses, form.strongest_node())
+        return columns, solver.solve(form, columns)
 
     @cached_property
     def _alignment(self) -> Alignment:

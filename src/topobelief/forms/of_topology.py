@@ -12,7 +12,7 @@ from topobelief.graph.alignment import DEFAULT_SAMPLE_SIZE, centring, sample_of
 from topobelief.graph.information import isotropic_weights, scalar_weights
 from topobelief.graph.topology import Topology
 from topobelief.linalg import EdgeForm, Estimate, LogDetSolver, laplacian_form
-from topobelief.linalg.inverse import InverseSolver
+from topobelief.linalg.inverse_traces import inverse_traces
 
 
 class TopologyForms(TreeForms[float]):
@@ -81,10 +81,8 @@ class TopologyForms(TreeForms[float]):
 
 def mean_resistance(laplacian: EdgeForm, num_nodes: int, sample: IntArray) -> Estimate[float]:
     """1/|S| tr(Pi_n L^-1 Pi_n) over a sample S of the nodes, from scratch."""
-    columns = np.zeros((num_nodes, 1, len(sample)))
-    columns[sample, 0] = centring(len(sample))
-    solver = InverseSolver(laplacian.edges, num_nodes, laplacian.strongest_node())
-    return 1 / len(sample) * solver.solve(laplacian, columns).trace
+    [trace] = inverse_traces(laplacian, num_nodes, [(sample, centring(len(sample))[:, None])])
+    return 1 / len(sample) * trace
 
 
 def weights_of(information: FloatArray) -> tuple[FloatArray, FloatArray]:

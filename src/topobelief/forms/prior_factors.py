@@ -26,7 +26,6 @@ from topobelief.linalg.solutions import solutions
 SolvedName = Literal["trees_p"] | PositionsName
 
 _HOLD_STRONGEST_ERROR = 1e-6  # nats; below it one more factorisation would make no visible difference
-_STRONG_ROWS_ERROR = 1e-4  # nats; beyond it one more factorisation with strong rows last is worth its time
 _APPENDED_SHARE = 0.2  # of the longest elimination path: poses appended to an old order beyond which a new order pays
 
 
@@ -105,12 +104,8 @@ class PriorFactors:
         Where that is not enough, strong rows come last.
         """
         if (name, shift) not in self._best:
-            factor, edges, num_nodes = self._plain_factor(name, shift), self.graph.edges, self.graph.num_poses
-            if not factor.log_det.error <= _STRONG_ROWS_ERROR:
-                form = form_of(name, self)
-                apart = FormFactor.with_strong_rows_last(edges, num_nodes, factor.tree.held, form, shift=shift)
-                factor = min(factor, apart or factor, key=lambda candidate: candidate.log_det.error)
-            self._best[name, shift] = factor
+            factor = self._plain_factor(name, shift)
+            self._best[name, shift] = factor.or_with_strong_rows_last(form_of(name, self), shift=shift)
         return self._best[name, shift]
 
     def _plain_factor(self, name: FormName, shift: float) -> FormFactor:

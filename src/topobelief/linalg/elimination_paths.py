@@ -40,6 +40,7 @@ _NUM_PROBES = 8
 _PROBE_SAFETY = 2.0
 _CONFIDENCE = 4.0
 _ASSEMBLY_OPERATIONS = 16
+_STRONG_ROWS_ERROR = 1e-4  # nats; beyond it one more factorisation with strong rows last is worth its time
 _LEAST_WORK = 100_000  # block products below which a thread costs more than it saves
 
 
@@ -145,6 +146,14 @@ class FormFactor:
         if not math.isfinite(others.log_det.error):
             return None
         return others._with_more_rows(strong)
+
+    def or_with_strong_rows_last(self, form: EdgeForm, *, shift: float = 0.0) -> FormFactor:
+        """This factor or, where its error is worth one more factorisation, the one with strong rows last, if that is better."""
+        if self.log_det.error <= _STRONG_ROWS_ERROR:
+            return self
+        tree = self.tree
+        apart = FormFactor.with_strong_rows_last(tree.edges, tree.num_nodes, tree.held, form, shift=shift)
+        return min(self, apart or self, key=lambda candidate: candidate.log_det.error)
 
     @property
     def block_size(self) -> int:

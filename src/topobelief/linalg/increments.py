@@ -24,7 +24,7 @@ from typing import Literal
 
 import numpy as np
 
-from topobelief.arrays import FloatArray, IntArray
+from topobelief.arrays import BoolArray, FloatArray, IntArray
 from topobelief.linalg.chain_kernels import add_chained_increments
 from topobelief.linalg.compiled import compiled, in_parallel, num_threads, unset
 from topobelief.linalg.edge_form import EdgeForm
@@ -88,6 +88,7 @@ def log_det_increments(
     wanted: Wanted = "closures",
     first_rows: int = 0,
     solutions: FloatArray | None = None,
+    wanted_of: BoolArray | None = None,
 ) -> Increments:
     """Increments of ln det M by each extension.
 
@@ -106,8 +107,12 @@ def log_det_increments(
         How many of a closure's rows come first.
     solutions : shape (num_existing, b, s), optional
         Z, where gains are wanted; not for a window.
+    wanted_of : shape (K,), optional
+        Extensions whose increments are wanted; those of the others are nan. Default: all.
     """
     out = np.zeros((extensions.num_extensions, 8))
+    if wanted_of is not None:
+        out[~wanted_of] = np.nan
     columns = np.zeros((0, form.block_size, 0)) if solutions is None else solutions
     rows_i, rows_j = np.ascontiguousarray(form.rows_i), np.ascontiguousarray(form.rows_j)
     path_of = np.full(extensions.num_existing, -1)
@@ -127,7 +132,7 @@ def log_det_increments(
         in_parallel(add, np.linspace(0, len(which), parts + 1).astype(int).tolist())
 
     for which in [np.arange(extensions.num_extensions)] if factor is None else _groups(factor, extensions):
-        add_group(which)
+        add_group(which if wanted_of is None else which[wanted_of[which]])
     forest, closures, held, first, others, chained, size, gains = np.ascontiguousarray(out.T)
     error = UNIT_ROUNDOFF * (_OPERATIONS * size + np.abs(forest) + np.abs(closures) + np.abs(chained))
     error += _root_errors(form, extensions)

@@ -13,18 +13,11 @@ from topobelief.arrays import FloatArray, IntArray, ReadOnlyArrays, frozen_float
 from topobelief.errors import InvalidInputError
 from topobelief.io.json_values import without_nan
 from topobelief.planning.decision_table import as_html, as_text, decision_table
-from topobelief.planning.registry import OBJECTIVES, chosen
+from topobelief.planning.registry import OBJECTIVES, SIGNATURE_WORDS, chosen
 from topobelief.planning.units import quantity, shown_factor, shown_unit
 from topobelief.wording import closures_in_words
 
 SCHEMA = "topobelief.decision/2"
-
-_SIGNATURE_NAMES = {
-    "spanning_trees": "spanning trees",
-    "von_neumann": "von Neumann entropy",
-    "von_neumann_approx": "von Neumann entropy by degrees",
-    "resistance": "effective resistance",
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +63,8 @@ class Decision(ReadOnlyArrays):
         Whether the upper bound of the best lies below the margin; None where no margin was given.
     num_evaluations : int
         Exact evaluations made; actions that add the same poses and measurements share one.
+    exact_bounds : bool
+        Whether the exact values of all actions were computed in place of bounds, because they cost no more.
     proven_optimal : bool
     candidates : tuple of Candidate
     objective, signature, bounds, determinant : str
@@ -92,6 +87,7 @@ class Decision(ReadOnlyArrays):
     signature: str
     bounds: str
     determinant: str
+    exact_bounds: bool = False
 
     def __post_init__(self) -> None:
         for name in ("signatures", "lower", "upper", "entropies"):
@@ -140,6 +136,8 @@ class Decision(ReadOnlyArrays):
                 f"No candidate can be better by more than {quantity(self.error_bound, self.unit)}; "
                 f"{ruled_out} {'was' if ruled_out == 1 else 'were'} ruled out by bounds."
             )
+        elif self.exact_bounds and total > 1:
+            sentences.append(f"The exact values of all {total} were computed, since they cost no more than bounds.")
         elif self.proven_optimal and total > 1:
             count, skipped = self.num_evaluations, int(np.isnan(self.entropies).sum())
             skipped = f"; bounds ruled out the other {skipped}" if count and skipped else ""
@@ -150,12 +148,11 @@ class Decision(ReadOnlyArrays):
     def _claim(self) -> str:
         if self.num_actions == 1:
             return "is the only candidate: there is nothing to choose from."
-        by = _SIGNATURE_NAMES.get(self.signature, self.signature)
         if self.proven_optimal:
             return f"is optimal ({self.quantity})."
         if self.num_evaluations:
             return f"has the least {self.quantity} of the {self.num_evaluations} evaluated."
-        return f"is the best by {by}."
+        return f"is the best by {SIGNATURE_WORDS.get(self.signature, self.signature)}."
 
     def __repr__(self) -> str:
         """The choice and what is known of it; `str` is the table."""
@@ -185,6 +182,7 @@ class Decision(ReadOnlyArrays):
             "margin_met": self.margin_met,
             "num_evaluations": self.num_evaluations,
             "proven_optimal": self.proven_optimal,
+            "exact_bounds": self.exact_bounds,
             "ranking": self.ranking.tolist(),
             "survivors": self.survivors.tolist(),
             "actions": [
@@ -252,6 +250,7 @@ class Decision(ReadOnlyArrays):
                 signature=data["signature"],
                 bounds=data["bounds"],
                 determinant=data["determinant"],
+                exact_bounds=bool(data.get("exact_bounds", False)),
                 **columns,
             )
         except KeyError as error:

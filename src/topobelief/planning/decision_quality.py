@@ -30,13 +30,15 @@ class DecisionQuality:
     Attributes
     ----------
     error
-        epsilon, nats: what choosing by signature loses; inf where that is more than the largest double.
+        epsilon, in the unit of J: what choosing by signature loses; inf where that is more than the largest double.
     gamma
-        Nats: how far the order of all actions is from being kept.
+        In the unit of J: how far the order of all actions is from being kept.
     action_consistent, order_consistent
         Whether epsilon, and gamma, vanish (to rounding).
     spearman, kendall, pearson
         Correlations of J with -s; 1 is perfect, nan where J or s is constant.
+    unit
+        Of the error and gamma; empty where it is not known.
     """
 
     error: float
@@ -46,21 +48,25 @@ class DecisionQuality:
     spearman: float
     kendall: float
     pearson: float
+    unit: str = ""
 
     def __repr__(self) -> str:
         correlations = f"Spearman {self.spearman:.3g}, Kendall {self.kendall:.3g}, Pearson {self.pearson:.3g}"
-        return f"DecisionQuality(error {self.error:.3g} nats, gamma {self.gamma:.3g} nats, {correlations})"
+        error, gamma = (f"{value:.3g} {self.unit}".rstrip() for value in (self.error, self.gamma))
+        return f"DecisionQuality(error {error}, gamma {gamma}, {correlations})"
 
 
-def decision_quality(entropies: ArrayLike, signatures: ArrayLike) -> DecisionQuality:
+def decision_quality(entropies: ArrayLike, signatures: ArrayLike, *, unit: str = "") -> DecisionQuality:
     """Compare a signature with the entropies that it stands for.
 
     Parameters
     ----------
     entropies : shape (K,)
-        Exact J of each action, nats, all finite; K >= 1.
+        Exact J of each action, all finite; K >= 1.
     signatures : shape (K,)
         s of each action; the larger, the better. The first of equal ones is chosen.
+    unit
+        Of J, such as "nats" or "m" (`Decision.unit`), for the text that shows the quality.
 
     Raises
     ------
@@ -85,8 +91,8 @@ def decision_quality(entropies: ArrayLike, signatures: ArrayLike) -> DecisionQua
     gamma = max(_worst_violation(scaled, s) / 2, _violation_of_chosen(scaled, s, chosen))
     tolerance = _RELATIVE_TOLERANCE * float(np.abs(scaled).max())
     with np.errstate(over="ignore"):
-        error_nats, gamma_nats = np.ldexp([error, gamma], exponent).tolist()
-    return DecisionQuality(error_nats, gamma_nats, error <= tolerance, gamma <= tolerance, spearman, kendall, pearson)
+        error_of_J, gamma_of_J = np.ldexp([error, gamma], exponent).tolist()
+    return DecisionQuality(error_of_J, gamma_of_J, error <= tolerance, gamma <= tolerance, spearman, kendall, pearson, unit)
 
 
 def rank_correlation(a: ArrayLike, b: ArrayLike) -> float:

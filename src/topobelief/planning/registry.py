@@ -24,6 +24,14 @@ SIGNATURES = {
 SIGNATURE_UNITS = {"spanning_trees": "nats", "resistance": "m"}
 """Of the signatures that estimate an objective of this unit; from these the cost is taken before actions are ranked."""
 
+SIGNATURE_WORDS = {
+    "spanning_trees": "spanning trees",
+    "von_neumann": "von Neumann entropy",
+    "von_neumann_approx": "von Neumann entropy by degrees",
+    "resistance": "effective resistance",
+}
+"""Signatures as sentences name them."""
+
 BOUNDS = {
     "paper": "topobelief.bounds.paper:paper",
     "fischer": "topobelief.bounds.fischer:fischer",

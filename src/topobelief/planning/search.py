@@ -66,7 +66,7 @@ class Search:
         count = len(actions)
         self._costs = np.array([action.cost for action in actions])
         self._signatures, self._low, self._high, self._values = np.full((4, count), np.nan)
-        self._free = Estimate(*np.full((2, count), np.nan))  # exact values that came with the bounds
+        self._came_along = np.zeros(count, np.bool_)  # exact values that cost no more than bounds
         self._first: IntArray = first_alike(actions)
         self._ranking: list[int] = []
 
@@ -110,9 +110,7 @@ class Search:
             places = left[: min(size, max_evaluations - evaluated)]
             if not places:
                 return
-            exact = self._exact(places)
-            self._values[places] = exact.value
-            self._low[places], self._high[places] = exact.value - exact.error, exact.value + exact.error
+            self._keep(places, self._batch(places).entropies())
             evaluated += len(places)
             size = min(2 * size, self._engine.batch_size)
             self._clock.report("evaluations", evaluated, evaluated + len(left) - len(places))
@@ -189,14 +187,15 @@ class Search:
         return Batch(self._engine, self._criteria, [self._actions[place] for place in places], places)
 
     def _bound(self, places: list[int], batch: Batch) -> None:
+        """Bounds, and exact values in their place where these came along at no cost."""
         self._low[places], self._high[places] = batch.bounds()
         if batch.knows_entropies:
-            exact = batch.entropies()
-            self._free.value[places], self._free.error[places] = exact.value, exact.error
+            self._keep(places, batch.entropies())
+            self._came_along[places] = True
 
-    def _exact(self, places: list[int]) -> Estimate[FloatArray]:
-        free = Estimate(self._free.value[places], self._free.error[places])
-        return free if np.isfinite(free.value).all() else self._batch(places).entropies()
+    def _keep(self, places: list[int], exact: Estimate[FloatArray]) -> None:
+        self._values[places] = exact.value
+        self._low[places], self._high[places] = exact.value - exact.error, exact.value + exact.error
 
     def _best(self) -> int:
         """U^, or the least value once evaluated; the earlier in the ranking where values tie, rounded as signatures are."""
@@ -233,6 +232,7 @@ class Search:
             error_bound=error_bound,
             margin_met=margin_met,
             num_evaluations=int(np.count_nonzero(~np.isnan(self._values))),
+            exact_bounds=bool(self._came_along[self._first].all()),
             proven_optimal=proven,
             candidates=tuple(
                 Candidate(

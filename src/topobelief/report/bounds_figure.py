@@ -13,8 +13,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from topobelief.arrays import FloatArray
+from topobelief.arrays import BoolArray, FloatArray
 from topobelief.planning.decision import Decision
+from topobelief.planning.registry import SIGNATURE_WORDS
 from topobelief.planning.units import quantity, shown_factor, shown_unit
 from topobelief.report import style
 from topobelief.report.canvas import Align, Canvas, Entry, Panel
@@ -31,6 +32,7 @@ _COLUMNS: tuple[tuple[str, float, Align], ...] = (
     ("poses", 2.15, "right"),
     ("closures", 2.78, "right"),
 )
+_LEAST_WIDTH = 0.01  # of all that is shown: bars less wide than that are drawn as points
 _NAME_COLUMN = 11  # characters that fit it
 
 
@@ -65,8 +67,9 @@ def draw_rows(panel: Panel, decision: Decision, entropies: ArrayLike | None = No
     """The plot alone: a row an action, the first of the ranking above; returns the key. Arguments as for `draw_bounds`."""
     exact = decision.entropies if entropies is None else np.asarray(entropies, dtype=np.float64)
     costs = np.array([candidate.cost for candidate in decision.candidates])
-    key = _draw_intervals(panel, decision)
-    key += _draw_exact(panel, decision, exact + costs)
+    points = _is_point(decision)
+    key = _draw_intervals(panel, decision, points)
+    key += _draw_exact(panel, decision, np.where(points, np.nan, exact + costs))
     key += _draw_threshold(panel, decision)
     panel.axes.set_ylim(decision.num_actions - 0.5, -0.5)
     panel.axes.margins(x=0.03)
@@ -75,22 +78,38 @@ def draw_rows(panel: Panel, decision: Decision, entropies: ArrayLike | None = No
     return key
 
 
-def _draw_intervals(panel: Panel, decision: Decision) -> list[Entry]:
+def _is_point(decision: Decision) -> BoolArray:
+    """Evaluated actions whose intervals, as wide as rounding, cannot be seen, shape (K,)."""
+    ends = np.concatenate([decision.lower, decision.upper])
+    extent = float(np.ptp(ends[np.isfinite(ends)])) if np.isfinite(ends).any() else 0.0
+    return ~np.isnan(decision.entropies) & (decision.upper - decision.lower <= _LEAST_WIDTH * extent)
+
+
+def _draw_intervals(panel: Panel, decision: Decision, points: BoolArray) -> list[Entry]:
+    """Bars in the colour of how an action stands; points in place of bars that cannot be seen."""
     colours, factor = style.standing_colours(decision), shown_factor(decision.unit)
-    drawn: set[str] = set()
+    bar: dict[str, Any] = {"linewidth": 5, "solid_capstyle": "butt", "alpha": 0.75}
+    point: dict[str, Any] = {"linestyle": "none", "marker": "D", "markersize": 5}
+    drawn: dict[str, dict[str, Any]] = {}
     ranking: list[int] = decision.ranking.tolist()
     for row, action in enumerate(ranking):
         if row % 2:
             panel.axes.axhspan(row - 0.5, row + 0.5, color=style.STRIPE, linewidth=0, zorder=0)
         if math.isfinite(decision.lower[action]) or math.isfinite(decision.upper[action]):
             colour = colours[action]
-            drawn.add(colour)
+            if points[action]:
+                drawn.setdefault(colour, point)
+            else:
+                drawn[colour] = bar
             ends = [(factor * float(decision.lower[action]), row), (factor * float(decision.upper[action]), row)]
-            panel.line(ends, color=colour, linewidth=5, solid_capstyle="butt", alpha=0.75, zorder=3)
+            if points[action]:
+                panel.line(ends[1:], color=colour, zorder=5, **point)
+                continue
+            panel.line(ends, color=colour, zorder=3, **bar)
             panel.line(ends, linestyle="none", marker="|", color=colour, markersize=6.5, zorder=3)
     labels = {style.BEST: "chosen", style.SURVIVOR: "may be optimal", style.RULED_OUT: "ruled out"}
     return [
-        Entry(label, color=colour, linewidth=5, alpha=0.75, solid_capstyle="butt")
+        Entry(f"{label}, exact" if drawn[colour] is point else label, color=colour, **drawn[colour])
         for colour, label in labels.items()
         if colour in drawn
     ]
@@ -153,6 +172,8 @@ def _title(decision: Decision) -> str:
     ruled_out = total - len(decision.survivors)
     if total == 1:
         return f"{chosen}, the only candidate"
+    if decision.exact_bounds:
+        return f"{chosen} has the least of the exact values of all {total} candidates"
     if np.isnan(decision.lower).any():
         return f"{chosen} is chosen among {total} candidates"
     if not ruled_out:
@@ -164,7 +185,7 @@ def _title(decision: Decision) -> str:
 def _subtitle(decision: Decision) -> str:
     if decision.num_actions == 1:
         return "there is nothing to compare it with"
-    ranked = f"in the order of {style.SIGNATURES.get(decision.signature, decision.signature)}, best first"
+    ranked = f"in the order of {SIGNATURE_WORDS.get(decision.signature, decision.signature)}, best first"
     if decision.margin_met is not None:
         return f"{ranked}; the margin is {'met' if decision.margin_met else 'missed'}"
     if decision.proven_optimal:

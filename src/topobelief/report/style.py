@@ -30,13 +30,6 @@ FREE = "#FFFFFF"
 NOT_FREE = "#EBECEE"
 WALL = "#A5A8AD"
 
-SIGNATURES = {
-    "spanning_trees": "spanning trees",
-    "von_neumann": "von Neumann entropy",
-    "von_neumann_approx": "von Neumann entropy by degrees",
-    "resistance": "effective resistance",
-}
-
 _SETTINGS = {
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],  # comes with matplotlib, so a figure is the same on every machine
