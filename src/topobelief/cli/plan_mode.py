@@ -12,7 +12,7 @@ import typer
 from topobelief.cli.extras import require_extras
 from topobelief.optional import has_kernels
 
-SECONDS = 3.0
+SECONDS = 2.0
 """How long the roadmap is searched unless a limit is given."""
 
 _OF_LISTS = {

@@ -285,7 +285,7 @@ Deadline = Annotated[
         "--deadline",
         metavar="S",
         help="How long to search the roadmap; among candidates, time limit for the decision. Ctrl-C ends a search, too.",
-        show_default="3; none with --max-evaluations or candidates",
+        show_default="2; none with --max-evaluations or candidates",
         callback=values.above_zero,
         rich_help_panel=_SEARCH,
     ),
