@@ -183,4 +183,4 @@ def test_an_interrupted_search_gives_the_best_so_far(topobelief, office, monkeyp
     outcome = topobelief(to_goal(office))
     assert outcome.code == 0
     assert "ended: interrupted" in outcome.out
-    assert "Nothing is proven of other walks yet" in outcome.out
+    assert "Nothing is proven of other walks in this time" in outcome.out

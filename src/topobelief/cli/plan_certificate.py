@@ -53,7 +53,7 @@ def certificate(searched: Searched, limits: Limits) -> str:
     """Below which value no walk is, and which walks that is about."""
     found, bound = searched.found, searched.lower_bound
     if math.isinf(bound):
-        return "Nothing is proven of other walks yet: give more --seconds."
+        return "Nothing is proven of other walks in this time: give more --seconds."
     to = " to the goal" if searched.num_searches == 1 else " to a goal"
     where = to if searched.has_goal else " back to the start" if limits.return_to_start else ""
     longest = "" if searched.num_searches > 1 else f", up to {found.max_length:.1f} m,"
