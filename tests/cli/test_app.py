@@ -116,7 +116,7 @@ def test_an_interrupt_is_one_line_and_leaves_no_file(topobelief, office, tmp_pat
         raise KeyboardInterrupt
 
     monkeypatch.setattr(plan_candidates, "find_candidates", interrupted)
-    outcome = topobelief(office.plan("--out", "result"))
+    outcome = topobelief(office.plan("--candidates", 2, "--out", "result"))
     assert outcome.code == app.INTERRUPTED
     assert outcome.err == "topobelief: interrupted; nothing was left half-written\n"
     assert list(tmp_path.iterdir()) == []
@@ -125,7 +125,7 @@ def test_an_interrupt_is_one_line_and_leaves_no_file(topobelief, office, tmp_pat
 def test_a_bug_keeps_its_traceback(topobelief, office, monkeypatch):
     monkeypatch.setattr(plan_candidates, "find_candidates", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
-        topobelief(office.plan())
+        topobelief(office.plan("--candidates", 2))
 
 
 @pytest.mark.filterwarnings("default")

@@ -125,7 +125,7 @@ WALKS = {
         (["--goal", "0", "5", "--why", "7"], "expected --why as the number of a path (0 to 2) or its label, got '7'"),
         (["--goal", "0", "5", "--closures", "none"], "'--closures'"),
         (["--goal", "0", "5", "--closures", "learned", "--closure-radius", "1"], "expected --closures learned without numbers"),
-        ([], "expected --goal ID or X Y, or a candidate of your own by --path FILE"),
+        ([], "expected --goal ID or X Y, a candidate of your own by --path FILE, or --max-length M"),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(topobelief, office, tmp_path, options, message):

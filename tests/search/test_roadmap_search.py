@@ -11,7 +11,7 @@ import pytest
 import topobelief as tb
 from small_roadmaps import OPEN, drive, simple_walks, small_roadmap, values_of
 from topobelief.candidates.roadmap import Roadmap
-from topobelief.errors import NotOptimizedWarning
+from topobelief.errors import InvalidInputError, NotOptimizedWarning
 from topobelief.search.result import SearchResult
 
 CLOSURES = tb.ClosureModel(radius=1.5, max_per_pose=2, probability=1.0, min_index_gap=3)
@@ -289,3 +289,23 @@ def test_the_bound_covers_closures_with_a_noise_of_their_own():
     values = values_of(graph, roadmap, simple_walks(roadmap, limit, end=1), objective="map", closures=CLOSURES)
     result = search(graph, roadmap, goal=roadmap.vertices[1], max_length=limit, turn=None, deadline=2)
     assert result.lower_bound <= values.min() + 1e-9 * abs(values.min())
+
+
+def test_no_bound_is_begun_that_the_time_does_not_allow(monkeypatch):
+    graph, roadmap = scene(5, num_vertices=8)
+    options = {"goal": roadmap.vertices[1], "max_detour": 1.5, "turn": None, "max_evaluations": 20, "deadline": 100.0}
+    assert math.isfinite(search(graph, roadmap, **options).lower_bound)
+    monkeypatch.setattr("topobelief.search.roadmap_search._TO_MAKE_BOUND", 1e6)
+    assert math.isinf(search(graph, roadmap, **options).lower_bound)
+
+
+def test_a_search_stops_after_so_many_evaluations_or_when_nothing_more_than_enough_is_left():
+    graph, roadmap = scene(5, num_vertices=11)
+    options = {"max_length": 5.0, "turn": None}
+    few = search(graph, roadmap, max_evaluations=70, **options)
+    assert few.stopped_by in ("evaluations", "proof")
+    assert few.num_evaluations < 400
+    assert search(graph, roadmap, enough=1e6, **options).stopped_by == "enough"
+    for wrong in ({"enough": -1.0}, {"max_evaluations": 0}):
+        with pytest.raises(InvalidInputError, match=next(iter(wrong))):
+            search(graph, roadmap, **options, **wrong)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import typer
 
+from topobelief.cli import plan_mode
 from topobelief.cli import plan_options as options
 from topobelief.cli.reading import Component, Drop, Edge2OrderOption, Planar, RobustAsPlain, reading_options
 from topobelief.errors import NotOptimizedWarning
@@ -25,8 +26,11 @@ def plan(
     unknown: options.UnknownCells = "occupied",
     robot_radius: options.RobotRadius = 0.35,
     path: options.PathFiles = None,
-    candidates: options.NumCandidates = 20,
+    candidates: options.NumCandidates = None,
     max_detour: options.MaxDetour = None,
+    max_length: options.MaxLength = None,
+    return_to_start: options.Return = False,
+    enough: options.Enough = None,
     vertices: options.Vertices = 1000,
     seed: options.Seed = 0,
     spacing: options.Spacing = 1.0,
@@ -61,14 +65,13 @@ def plan(
     component: Component = "all",
     planar: Planar = False,
 ) -> None:
-    """Choose the best path to a goal on a pose-graph map.
+    """Choose the best way to a goal on a pose-graph map, or the best trip to improve the map.
 
-    Compares paths by how well the map would be known after each, and proves which is the best.
+    Searches a roadmap for the way after which the map is known best, and says how much better any other could be.
     """
     if (map_file is None) == (not along_trajectory):
         raise typer.BadParameter("expected one of --map FILE and --along-trajectory.", param_hint="the world")
-    if not goal and not path:
-        raise typer.BadParameter("expected --goal ID or X Y, or a candidate of your own by --path FILE.", param_hint="the goal")
+    mode = plan_mode.choose(context.params)
     from topobelief.cli.console import Reporter
 
     reporter = Reporter(as_json=as_json)
@@ -78,11 +81,13 @@ def plan(
         from topobelief.candidates.propose import CandidateRule
         from topobelief.cli import (
             plan_candidates,
+            plan_certificate,
             plan_draws,
             plan_ends,
             plan_errors,
             plan_files,
             plan_reasons,
+            plan_search,
             plan_stages,
             plan_world,
         )
@@ -98,7 +103,7 @@ def plan(
     bounds = bounds or ("fischer" if as_paper else "auto")
     proof = proof or ("bounded" if as_paper or margin is not None else "optimal")
     rule = CandidateRule(
-        num_paths=candidates,
+        num_paths=candidates or 20,
         max_detour=limit if math.isfinite(limit) else None,
         num_vertices=vertices,
         robot_radius=robot_radius,
@@ -135,28 +140,50 @@ def plan(
             normalized=normalized,
             allow_dense_spectrum=allow_dense_spectrum,
         )
-    found = plan_candidates.find_proposals(
-        graph, world, begin, goals, path or (), rule, reporter, cost_per_metre=cost_per_metre
+    if mode.note:
+        reporter.note(mode.note)
+    searched: plan_search.Searched | None = None
+    limits = plan_search.Limits(
+        max_length=max_length,
+        return_to_start=return_to_start,
+        seconds=plan_mode.SECONDS if deadline is None and max_evaluations is None else deadline,
+        max_evaluations=max_evaluations,
+        cost_per_metre=cost_per_metre,
+        enough=enough,
     )
+    if mode.searches:
+        searched = plan_search.search(graph, world, begin, goals, rule, objective, limits, reporter)
+        found = searched.proposals
+    else:
+        found = plan_candidates.find_proposals(
+            graph, world, begin, goals, path or (), rule, reporter, cost_per_metre=cost_per_metre
+        )
     if warning := rate_warning(graph, model, found.actions):
         reporter.note(warning)
     with reporter.stage("decision") as update:
-        decision = planner.decide(
-            found.actions,
-            margin=margin,
-            proof=proof,
-            max_evaluations=max_evaluations,
-            deadline=deadline,
-            on_progress=lambda _, done, total: update(done, total),
+        decision = (
+            plan_search.decide(planner, searched)
+            if searched is not None
+            else planner.decide(
+                found.actions,
+                margin=margin,
+                proof=proof,
+                max_evaluations=max_evaluations,
+                deadline=deadline,
+                on_progress=lambda _, done, total: update(done, total),
+            )
         )
     explained = plan_reasons.asked_for(decision, why or ())
     errors = plan_errors.expected(graph, found, decision, reporter)
-    reasons = plan_reasons.reasons(graph, begin, found, decision, errors)
-    answer = plan_errors.answer(found, decision, errors)
-    plan_stages.say_decision(decision, answer, rule, reporter, along_trajectory=along_trajectory)
+    reasons = plan_reasons.reasons(graph, begin, found, decision, errors, searched=mode.searches)
+    if searched is not None:
+        plan_certificate.say_search(searched, decision, errors, limits, reporter)
+    else:
+        answer = plan_errors.answer(found, decision, errors)
+        plan_stages.say_decision(decision, answer, rule, reporter, along_trajectory=along_trajectory)
 
     def detailed(index: int) -> list[str]:
-        return plan_reasons.details(graph, begin, found, decision, index, reporter)
+        return plan_reasons.details(graph, begin, found, decision, index, reporter, searched=mode.searches)
 
     plan_reasons.say(reasons, decision, explained, detailed, reporter)
     spreads = plan_draws.spreads(planner, found, decision, errors.shortest_path, reporter, seed=seed)
@@ -175,6 +202,8 @@ def plan(
         rule=rule,
         options=context.params | {"objective": objective, "signature": signature, "bounds": bounds, "proof": proof},
         notes=reporter.notes,
+        searched=searched,
+        limits=limits,
     )
     plan_files.write(folder, path_file, result, reporter)
     reporter.answer(plan_files.document(result))

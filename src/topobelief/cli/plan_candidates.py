@@ -18,8 +18,8 @@ from topobelief.candidates.propose import CandidateRule, Routes, find_routes, pr
 from topobelief.candidates.start import Start
 from topobelief.cli.console import Reporter
 from topobelief.cli.plan_ends import Goal, shown
-from topobelief.cli.plan_world import poses_outside
-from topobelief.errors import FileError, PlanningError
+from topobelief.cli.plan_world import told_of_poses_outside
+from topobelief.errors import FileError
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.path_formats import read_filed_path
@@ -102,12 +102,8 @@ def find_candidates(
     graph: PoseGraph, world: World, begin: Start, goal: Goal, rule: CandidateRule, reporter: Reporter
 ) -> list[FloatArray]:
     """Diverse paths from the start to a goal."""
-    try:
+    with told_of_poses_outside(graph, world):
         routes = find_routes(world, begin, goal.place, rule)
-    except PlanningError as error:
-        if outside := poses_outside(graph, world):
-            raise PlanningError(f"{error}; {outside}") from None
-        raise
     reporter.say(_described(routes, begin, goal, rule))
     return routes.paths
 

@@ -19,9 +19,11 @@ from topobelief.candidates.start import Start
 from topobelief.cli.console import Reporter
 from topobelief.cli.plan_arguments import GivenPlace
 from topobelief.cli.plan_candidates import Proposals
+from topobelief.cli.plan_certificate import document as found
 from topobelief.cli.plan_draws import Spread
 from topobelief.cli.plan_ends import Goal
 from topobelief.cli.plan_errors import PlanErrors
+from topobelief.cli.plan_search import Limits, Searched
 from topobelief.errors import FileError
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.files import atomic_file
@@ -49,6 +51,8 @@ class PlanResult:
     rule: CandidateRule
     options: Mapping[str, object]  # as given, what the rule settles aside
     notes: Sequence[str]
+    searched: Searched | None = None  # of the roadmap, where it was
+    limits: Limits | None = None  # of that search
 
 
 def checked_folder(folder: Path | None) -> Path | None:
@@ -110,6 +114,7 @@ def document(result: PlanResult) -> dict[str, object]:
             "x_y_yaw": path_poses(best).tolist(),
         },
         "expected_errors": result.errors.document(),
+        **({} if result.searched is None or result.limits is None else {"search": found(result.searched, result.limits)}),
         "closure_draws": [asdict(spread) for spread in result.spreads],
         "notes": list(result.notes),
         "topobelief": __version__,
@@ -145,7 +150,7 @@ def write(folder: Path | None, path_file: Path | None, result: PlanResult, repor
                 write_together(folder, writers)
         reporter.say(
             "",
-            f"Pictures: {folder / 'paths.png'} and {folder / 'bounds.png'}; decision: {folder / 'decision.json'}",
+            f"{_pictures_told(folder, result)}; decision: {folder / 'decision.json'}",
         )
     elif path_file is not None:
         write_together(path_file.absolute().parent, writers)
@@ -159,20 +164,30 @@ def _writer(text: str) -> Callable[[Path], object]:
     return lambda path: path.write_text(text, encoding="utf-8", newline="\n")
 
 
+def _pictures_told(folder: Path, result: PlanResult) -> str:
+    if result.searched is not None:
+        return f"Picture: {folder / 'paths.png'}"
+    return f"Pictures: {folder / 'paths.png'} and {folder / 'bounds.png'}"
+
+
 def _pictures(result: PlanResult) -> dict[str, Callable[[Path], object]]:
-    """What writes each picture."""
+    """What writes each picture: of a search one, with the front; of a list of candidates two."""
     from topobelief.report.bounds_figure import draw_bounds
     from topobelief.report.canvas import save_figure
     from topobelief.report.paths_figure import draw_paths
+    from topobelief.report.search_figure import draw_search
 
-    found, decision = result.proposals, result.decision
+    if result.searched is not None:
+        search = draw_search(result.graph, result.world, result.searched.found, start=result.start)
+        return {"paths.png": lambda path: save_figure(search, path)}
+    proposals, decision = result.proposals, result.decision
     paths = draw_paths(
         result.graph,
         result.world,
-        found.paths,
-        found.actions,
+        proposals.paths,
+        proposals.actions,
         decision,
-        goal=[goal.place for goal in result.goals] or [found.paths[decision.best][-1]],
+        goal=[goal.place for goal in result.goals] or [proposals.paths[decision.best][-1]],
         start=result.start,
     )
     bounds = draw_bounds(decision, result.entropies)

@@ -19,7 +19,8 @@ Unknown = Literal["occupied", "free"]
 Closures = Literal["learned", "paper", "by-hand"]
 
 _WORLD = "Where the robot may drive"
-_CANDIDATES = "Candidate paths"
+_SEARCH = "Search of the roadmap"
+_CANDIDATES = "A list of candidates"
 _FACTORS = "Predicted measurements"
 _DECISION = "Decision"
 _PROOF = "Bounds and proof"
@@ -91,24 +92,54 @@ PathFiles = Annotated[
     ),
 ]
 NumCandidates = Annotated[
-    int, typer.Option(min=1, metavar="N", help="Number of paths to compare, to each goal.", rich_help_panel=_CANDIDATES)
+    int | None,
+    typer.Option(
+        min=1,
+        metavar="N",
+        help="Compare so many diverse paths to each goal in place of searching the roadmap.",
+        show_default="20 with --as-paper and --path",
+        rich_help_panel=_CANDIDATES,
+    ),
+]
+MaxLength = Annotated[
+    float | None,
+    typer.Option(
+        metavar="M",
+        help="Longest way, metres, in place of --max-detour. Without a goal: of a trip to improve the map.",
+        show_default=False,
+        callback=values.above_zero,
+        rich_help_panel=_SEARCH,
+    ),
+]
+Return = Annotated[
+    bool,
+    typer.Option("--return", metavar="", help="The trip ends where it begins.", rich_help_panel=_SEARCH),
+]
+Enough = Annotated[
+    float | None,
+    typer.Option(
+        metavar="GAIN",
+        help="Without a goal: say whether any trip gains more than this, in the unit of the objective (metres of map error "
+        "for error, else nats).",
+        show_default=False,
+        callback=values.at_least_zero,
+        rich_help_panel=_SEARCH,
+    ),
 ]
 MaxDetour = Annotated[
     float | None,
     typer.Option(
         metavar="FACTOR",
         parser=values.detour,
-        help='Longest path, as a multiple of the shortest; "none" or 0 for no limit.',
+        help='Longest path, as a multiple of the shortest; "none" or 0 for no limit, of candidates only.',
         show_default="1.3",
-        rich_help_panel=_CANDIDATES,
+        rich_help_panel=_SEARCH,
     ),
 ]
-Vertices = Annotated[
-    int, typer.Option(min=2, metavar="N", help="Minimum number of roadmap vertices.", rich_help_panel=_CANDIDATES)
-]
+Vertices = Annotated[int, typer.Option(min=2, metavar="N", help="Minimum number of roadmap vertices.", rich_help_panel=_SEARCH)]
 Seed = Annotated[
     int,
-    typer.Option(min=0, metavar="N", help="Random seed; the same seed gives the same paths.", rich_help_panel=_CANDIDATES),
+    typer.Option(min=0, metavar="N", help="Random seed; the same seed gives the same roadmap.", rich_help_panel=_SEARCH),
 ]
 
 Spacing = Annotated[
@@ -252,7 +283,13 @@ Margin = Annotated[
 Deadline = Annotated[
     float | None,
     typer.Option(
-        metavar="S", help="Time limit for the decision, seconds.", callback=values.above_zero, rich_help_panel=_DECISION
+        "--seconds",
+        "--deadline",
+        metavar="S",
+        help="How long to search the roadmap; among candidates, time limit for the decision. Ctrl-C ends a search, too.",
+        show_default="2; none with --max-evaluations or candidates",
+        callback=values.above_zero,
+        rich_help_panel=_SEARCH,
     ),
 ]
 

@@ -25,11 +25,17 @@ _NARROW = 1e-3  # of a value: bounds that differ by less tell it well enough for
 _EQUAL = 1e-6  # of a value: candidates that differ by less are as good
 
 
-def reasons(graph: PoseGraph, start: Start, proposals: Proposals, decision: Decision, errors: PlanErrors) -> list[str]:
-    """A sentence for each candidate, in the order of their indices: what it sees again, and what excludes it."""
+def reasons(
+    graph: PoseGraph, start: Start, proposals: Proposals, decision: Decision, errors: PlanErrors, *, searched: bool = False
+) -> list[str]:
+    """A sentence for each candidate, in the order of their indices: what it sees again, and what excludes it.
+
+    Of candidates from a search (`searched`), the best is the best found.
+    """
+    claim = "chosen: the best way found" if searched else _claim(decision)
     return [
         f"{decision.name(index)} {described(graph, seen_again(graph, start.pose, action))}"
-        f"{_gain(decision, index, errors)}; {_standing(decision, index)}"
+        f"{_gain(decision, index, errors)}; {_standing(decision, index, claim)}"
         for index, action in enumerate(proposals.actions)
     ]
 
@@ -49,11 +55,11 @@ def _value(decision: Decision, index: int, *, tolerance: float = _EQUAL) -> floa
     return (lower + upper) / 2 if upper - lower <= tolerance * max(abs(lower), abs(upper)) else exact
 
 
-def _standing(decision: Decision, index: int) -> str:
+def _standing(decision: Decision, index: int, claim: str) -> str:
     """Chosen, or by how much it is worse, or what is not known."""
     best = decision.best
     if index == best:
-        return _claim(decision)
+        return claim
     name, unit = decision.name(best), decision.unit
     with_costs = ", costs included" if any(candidate.cost for candidate in decision.candidates) else ""
     value, value_of_best = _value(decision, index), _value(decision, best)
@@ -120,14 +126,23 @@ def asked_for(decision: Decision, names: Sequence[str]) -> list[int]:
 
 
 def details(
-    graph: PoseGraph, start: Start, proposals: Proposals, decision: Decision, index: int, reporter: Reporter
+    graph: PoseGraph,
+    start: Start,
+    proposals: Proposals,
+    decision: Decision,
+    index: int,
+    reporter: Reporter,
+    *,
+    searched: bool = False,
 ) -> list[str]:
-    """Lines about one candidate: its errors in centimetres, its rank, and each stretch that it sees again."""
+    """Lines about one candidate: its errors in centimetres, its rank, and each stretch that it sees again.
+
+    Candidates from a search (`searched`) were not chosen by a ranking, so it is not told.
+    """
     candidate, action = decision.candidates[index], proposals.actions[index]
     rank = 1 + decision.ranking.tolist().index(index)
-    lines = [
-        f"    {candidate.length:.1f} m, {candidate.num_new_poses} new poses; rank {rank} of {decision.num_actions} by signature"
-    ]
+    ranked = "" if searched else f"; rank {rank} of {decision.num_actions} by signature"
+    lines = [f"    {candidate.length:.1f} m, {candidate.num_new_poses} new poses{ranked}"]
     with reporter.stage("errors"), warnings.catch_warnings():
         warnings.simplefilter("ignore", NotOptimizedWarning)
         try:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 
 from topobelief.cli.console import Reporter
+from topobelief.errors import PlanningError
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io import floor_plan
 from topobelief.io.ros_map import Unknown
@@ -36,6 +39,17 @@ def read_world(
     if message := poses_outside(graph, world):
         reporter.note(message)
     return world
+
+
+@contextmanager
+def told_of_poses_outside(graph: PoseGraph, world: World) -> Generator[None]:
+    """Where there is no way, add that poses are not in free space, which may be the cause."""
+    try:
+        yield
+    except PlanningError as error:
+        if outside := poses_outside(graph, world):
+            raise PlanningError(f"{error}; {outside}") from None
+        raise
 
 
 def poses_outside(graph: PoseGraph, world: World) -> str | None:

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
 from topobelief.arrays import FloatArray
-from topobelief.candidates.start import find_start
+from topobelief.candidates.start import Start, find_start
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.report import style
 from topobelief.report.canvas import Canvas, Entry, Panel
@@ -29,7 +30,9 @@ _AXES = {
 }
 
 
-def draw_search(graph: PoseGraph, world: World, result: SearchResult) -> Figure:
+def draw_search(
+    graph: PoseGraph, world: World, result: SearchResult, *, start: int | ArrayLike | Start | None = None
+) -> Figure:
     """The best way over the map with the closures it is predicted to make, its alternatives, and the front beside it.
 
     Parameters
@@ -40,14 +43,15 @@ def draw_search(graph: PoseGraph, world: World, result: SearchResult) -> Figure:
         Where the robot may be.
     result
         Of `topobelief.search_roadmap`.
+    start
+        As given to it.
 
     Returns
     -------
     Figure
         `topobelief.report.canvas.save_figure` writes it.
     """
-    start = find_start(graph, None)
-    sight = Sight.of(graph, start, result.action)
+    sight = Sight.of(graph, find_start(graph, start), result.action)
     others = [way.path for way in result.alternatives]
     view = View.around(np.concatenate([result.path, sight.segments.reshape(-1, 2), *others]), padding=0.07)
     with style.style():

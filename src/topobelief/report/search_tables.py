@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from rich import box
 from rich.table import Table
 
-from topobelief.search.front import spread_on_front
 from topobelief.search.result import SearchResult, Way, said
 
 
-def front_rows(result: SearchResult, count: int = 5) -> list[tuple[str, str, str, str]]:
+def front_rows(result: SearchResult, count: int = 5, *, names: Mapping[int, str] | None = None) -> list[tuple[str, ...]]:
     """Some ways of the front: length, loop closures, objective without cost, and what of the gain of the longest it has.
 
     Parameters
@@ -19,25 +19,29 @@ def front_rows(result: SearchResult, count: int = 5) -> list[tuple[str, str, str
     result
     count
         How many at most, spread over the lengths, at least 2.
+    names
+        Of ways by their places on the front; where given, they begin the rows.
     """
-    places: list[int] = spread_on_front(result.front[:, 0], count).tolist()
+    places = result.few_places(count)
     ways = [result.on_front[place] for place in places]
     most = max((result.value_now - _objective(way) for way in ways), default=0.0)
     return [
         (
+            *(() if names is None else (names.get(place, ""),)),
             f"{way.length:.1f} m",
-            str(way.action.num_closures),
+            _closures(way),
             said(_objective(way), result.objective),
             f"{100 * (result.value_now - _objective(way)) / most:.0f} %" if most > 0 else "–",
         )
-        for way in ways
+        for place, way in zip(places, ways, strict=True)
     ]
 
 
-def front_table(result: SearchResult, count: int = 5) -> Table:
-    """Some ways of the front, shortest first."""
-    table = _table("what each further metre buys", ("way", "closures", "after it", "of the gain"))
-    for row in front_rows(result, count):
+def front_table(result: SearchResult, count: int = 5, *, names: Mapping[int, str] | None = None) -> Table:
+    """Some ways of the front, shortest first; names as for `front_rows`."""
+    columns = ("way", "closures", "after it", "of the gain")
+    table = _table("what each further metre buys", columns if names is None else ("", *columns))
+    for row in front_rows(result, count, names=names):
         table.add_row(*row)
     return table
 
@@ -47,7 +51,7 @@ def ways_table(result: SearchResult) -> Table:
     names = ["way", "closures", "after it"] + (["with its cost"] if result.cost_per_metre else [])
     table = _table("the best ways found", ("#", *names))
     for rank, way in enumerate((result.best, *result.alternatives), start=1):
-        cells = [f"{way.length:.1f} m", str(way.action.num_closures), said(_objective(way), result.objective)]
+        cells = [f"{way.length:.1f} m", _closures(way), said(_objective(way), result.objective)]
         cells += [said(way.value, result.objective)] if result.cost_per_metre else []
         table.add_row(str(rank), *cells, style="bold green" if rank == 1 else "")
     return table
@@ -65,10 +69,17 @@ def certificate(result: SearchResult) -> list[str]:
 _REASONS = {
     "proof": "the best way is proven",
     "gap": "the gap asked for is reached",
+    "enough": "nothing more than enough is left to gain",
     "deadline": "the time is up",
+    "evaluations": "as many ways were evaluated as allowed",
     "interrupt": "interrupted",
     "rest": "neither value nor bound improved any more",
 }
+
+
+def _closures(way: Way) -> str:
+    """How many loops are expected to be closed."""
+    return f"{way.action.expected_closures:.3g}"
 
 
 def _objective(way: Way) -> float:

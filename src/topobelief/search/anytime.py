@@ -12,11 +12,12 @@ from topobelief.search.evaluations import SAME_VALUE, Evaluations
 from topobelief.search.local_search import LocalSearch
 from topobelief.search.walks import Walk
 
-Reason = Literal["proof", "gap", "deadline", "interrupt", "rest"]
+Reason = Literal["proof", "gap", "enough", "deadline", "evaluations", "interrupt", "rest"]
 """Why a search stopped."""
 
 _BATCH = 64  # evaluations between two looks at the clock
-_WARM_UP = 400  # evaluations before the first step of the bound
+_WARM_UP = 400  # evaluations before the first step of the bound,
+_WARM_UP_SHARE = 0.4  # or this share of the time or of the evaluations that a search may take
 _PATIENCE = 1000  # evaluations without improvement after which local search rests
 _MOST_RESTARTS = 20  # without improvement, likewise
 _STEPS_PER_LOOK = 20  # of the bound, in which it closes at least
@@ -45,6 +46,10 @@ class AnytimeSearch:
         Seconds: on the monotonic clock, and from then on; None for no deadline.
     gap
         To stop at, in the unit of the objective.
+    enough
+        To stop when no walk can have a smaller value than this.
+    max_evaluations
+        After which to stop, whatever the time; None for no limit.
     on_progress
     """
 
@@ -57,11 +62,15 @@ class AnytimeSearch:
         began: float,
         deadline: float | None,
         gap: float,
+        enough: float = math.inf,
+        max_evaluations: int | None = None,
         on_progress: Callable[[SearchProgress], None] | None,
     ) -> None:
         self._evaluations, self._local, self._make_bound = evaluations, local, make_bound
-        self._began, self._gap, self._on_progress = began, gap, on_progress
+        self._began, self._gap, self._enough, self._on_progress = began, gap, enough, on_progress
         self._end = math.inf if deadline is None else began + deadline
+        self._warm = math.inf if deadline is None else began + _WARM_UP_SHARE * deadline
+        self._most = math.inf if max_evaluations is None else max_evaluations
         self._bound: WalkBound | None = None
         self._best = math.inf
         self._at_best = 0  # evaluations made when the best value was found
@@ -93,10 +102,14 @@ class AnytimeSearch:
                     return "proof"
                 if self._best - self.lower_bound <= self._gap:
                     return "gap"
+                if self.lower_bound >= self._enough:
+                    return "enough"
                 if time.monotonic() >= self._end:
                     return "deadline"
+                if len(self._evaluations) >= self._most:
+                    return "evaluations"
                 moved = self._search_on()
-                if len(self._evaluations) >= _WARM_UP or not moved:
+                if self._is_warm or not moved:
                     moved |= self._bound_on()
                 if not moved:
                     return "rest"
@@ -116,6 +129,12 @@ class AnytimeSearch:
             if self._local.restart(_BATCH):
                 return True
         return False
+
+    @property
+    def _is_warm(self) -> bool:
+        """Whether local search has found first values, or the bound would come too late otherwise."""
+        enough = min(_WARM_UP, _WARM_UP_SHARE * self._most)
+        return len(self._evaluations) >= enough or time.monotonic() >= self._warm
 
     def _bound_on(self) -> bool:
         """One step of the bound; whether it may still make progress."""

@@ -72,7 +72,8 @@ class SearchResult(ReadOnlyArrays):
     seconds : float
         Time taken.
     stopped_by : str
-        "proof", "gap", "deadline", "interrupt", or "rest" where neither value nor bound improved any more.
+        "proof", "gap", "enough", "deadline", "evaluations", "interrupt", or "rest" where neither value nor bound improved any
+        more.
     objective : str
     cost_per_metre : float
     """
@@ -177,7 +178,11 @@ class SearchResult(ReadOnlyArrays):
 
     def few_on_front(self, count: int) -> FloatArray:
         """Some points of the front that are spread over its lengths, its ends among them; shape (at most count, 2)."""
-        return self.front[spread_on_front(self.front[:, 0], count)]
+        return self.front[self.few_places(count)]
+
+    def few_places(self, count: int) -> list[int]:
+        """Places of these points on the front."""
+        return spread_on_front(self.front[:, 0], count).tolist()
 
 
 _NAMES = {
@@ -194,9 +199,8 @@ def said(value: float, objective: str) -> str:
     Examples
     --------
     >>> said(0.162, "error"), said(0.0029, "error"), said(12.34, "map")
-    ('16.2 cm', '2.90 mm', '12.3 nats')
+    ('16.2 cm', '0.290 cm', '12.3 nats')
     """
     if objective == "error":
-        small = f"{1000 * value:#.3g} mm" if 0 < abs(value) < 0.01 else f"{100 * value:#.3g} cm"
-        return small if abs(value) < 1 else f"{value:.2f} m"
+        return f"{100 * value:#.3g} cm" if abs(value) < 1 else f"{value:.2f} m"
     return f"{value:.1f} {_UNITS.get(objective, 'nats')}" if objective != "per_pose" else f"{value:.3f} nats per pose"

@@ -1,0 +1,224 @@
+"""The best way of the whole roadmap, to each goal of a plan or to anywhere, and what is said about it.
+
+A search is one more source of `Proposals`: its best way, the ways that its front is told by, and some alternatives. So they
+are explained, drawn and written as other candidates are; beside them stand the front and the certificate.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from topobelief.candidates.propose import CandidateRule
+from topobelief.candidates.roadmap import build_roadmap
+from topobelief.candidates.start import Start
+from topobelief.cli.console import Reporter
+from topobelief.cli.plan_candidates import Proposals
+from topobelief.cli.plan_ends import Goal, shown
+from topobelief.cli.plan_world import told_of_poses_outside
+from topobelief.errors import NotOptimizedWarning
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.planning.decision import Decision
+from topobelief.planning.planner import Planner
+from topobelief.search.anytime import SearchProgress
+from topobelief.search.result import SearchResult, Way, said
+from topobelief.search.roadmap_search import search_roadmap
+from topobelief.world import World
+
+POINTS_TOLD = 5
+"""Of the front."""
+
+_NUM_ALTERNATIVES = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What a search may take, and what it is for.
+
+    Attributes
+    ----------
+    max_length
+        Metres; None: `CandidateRule.max_detour` limits the length.
+    return_to_start
+        Whether a trip ends where it begins.
+    seconds
+        In all; None for no limit.
+    max_evaluations
+        To each goal; None for no limit.
+    cost_per_metre
+        In the unit of the objective.
+    enough
+        Gain of a trip that is worth driving for; None where that is not asked.
+    """
+
+    max_length: float | None
+    return_to_start: bool
+    seconds: float | None
+    max_evaluations: int | None
+    cost_per_metre: float
+    enough: float | None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Searched:
+    """What was found.
+
+    Attributes
+    ----------
+    proposals
+    best
+        Index of the best way among them.
+    found
+        The search that it comes from.
+    lower_bound
+        Of the ways to all goals.
+    num_searches
+        One to each goal.
+    names
+        Of proposals on the front of `found`, by their places on it.
+    """
+
+    proposals: Proposals
+    best: int
+    found: SearchResult
+    lower_bound: float
+    num_searches: int
+    names: dict[int, str]
+
+    @property
+    def has_goal(self) -> bool:
+        """Whether it leads to one."""
+        return self.proposals.goals[self.best] is not None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Listed:
+    """A way before it has its place among others."""
+
+    way: Way
+    goal: int | None
+
+
+def search(
+    graph: PoseGraph,
+    world: World,
+    begin: Start,
+    goals: Sequence[Goal],
+    rule: CandidateRule,
+    objective: str,
+    limits: Limits,
+    reporter: Reporter,
+) -> Searched:
+    """Search the roadmap for the best way to each goal, or for the best trip where there is none; the time is shared.
+
+    Raises
+    ------
+    PlanningError
+        Where a goal cannot be reached, or not within the length.
+    """
+    results: list[SearchResult] = []
+    listed: list[_Listed] = []
+    for number, goal in enumerate(goals or [None]):
+        seconds = None if limits.seconds is None else limits.seconds / max(1, len(goals))
+        found = _search_one(graph, world, begin, goal, rule, objective, replace(limits, seconds=seconds), reporter)
+        reporter.say(_work(found, begin, goal))
+        results.append(found)
+        listed += [_Listed(way, None if goal is None else number) for way in _ways(found)]
+    listed.sort(key=lambda each: each.way.length)
+    chosen = min(results, key=lambda found: found.value)
+    labels = [_label(index, each, goals) for index, each in enumerate(listed)]
+    ways = [each.way for each in listed]
+    places = {id(way): index for index, way in enumerate(chosen.on_front)}
+    actions = [replace(way.action, label=label) for way, label in zip(ways, labels, strict=True)]
+    return Searched(
+        Proposals([way.path for way in ways], actions, [each.goal for each in listed]),
+        next(index for index, way in enumerate(ways) if _same(way, chosen.best)),
+        chosen,
+        min(found.lower_bound for found in results),
+        len(results),
+        {places[id(way)]: label for way, label in zip(ways, labels, strict=True) if id(way) in places},
+    )
+
+
+def _search_one(
+    graph: PoseGraph,
+    world: World,
+    begin: Start,
+    goal: Goal | None,
+    rule: CandidateRule,
+    objective: str,
+    limits: Limits,
+    reporter: Reporter,
+) -> SearchResult:
+    place = None if goal is None else goal.place
+    with reporter.stage("roadmap"), told_of_poses_outside(graph, world):
+        roadmap = build_roadmap(world, begin.place, place, rule.num_vertices, rule.robot_radius, rule.seed)
+    with reporter.activity("search") as update, warnings.catch_warnings():
+        warnings.simplefilter("ignore", NotOptimizedWarning)  # reading the graph has told
+        return search_roadmap(
+            graph,
+            roadmap,
+            goal=place,
+            max_detour=rule.max_detour or 1.0,
+            max_length=limits.max_length,
+            return_to_start=limits.return_to_start,
+            objective=objective,
+            closures=rule.closures,
+            world=world if rule.line_of_sight else None,
+            cost_per_metre=limits.cost_per_metre,
+            deadline=limits.seconds,
+            enough=limits.enough,
+            max_evaluations=limits.max_evaluations,
+            num_alternatives=_NUM_ALTERNATIVES,
+            spacing=rule.spacing,
+            information=rule.information,
+            start=begin,
+            seed=rule.seed,
+            on_progress=lambda progress: update(_progress(progress, objective)),
+        )
+
+
+def _ways(found: SearchResult) -> list[Way]:
+    """Those that are worth telling, each once: on the front first, so that its points have names."""
+    few = found.few_places(POINTS_TOLD)
+    ways: list[Way] = [found.on_front[place] for place in few]
+    for way in (found.best, *([] if found.shortest is None else [found.shortest]), *found.alternatives):
+        if not any(_same(way, other) for other in ways):
+            ways.append(way)
+    return ways
+
+
+def _same(one: Way, other: Way) -> bool:
+    return np.array_equal(one.path, other.path)
+
+
+def _label(index: int, listed: _Listed, goals: Sequence[Goal]) -> str:
+    if len(listed.way.path) == 1:
+        return "staying"
+    return f"path {index}" + (f" to {goals[listed.goal].name}" if listed.goal is not None and len(goals) > 1 else "")
+
+
+def _progress(progress: SearchProgress, objective: str) -> str:
+    known = "" if math.isinf(progress.lower_bound) else f", none below {said(progress.lower_bound, objective)}"
+    return f"{progress.num_evaluations} ways: best {said(progress.value, objective)}{known}"
+
+
+def _work(found: SearchResult, begin: Start, goal: Goal | None) -> str:
+    """Which walks were searched, how hard, and why no longer."""
+    to = "" if goal is None else f" to {goal.name}"
+    reasons = {"rest": "it improved no more", "deadline": "the time was up", "evaluations": "their limit", "enough": "enough"}
+    why = {**reasons, "proof": "proven", "gap": "proven to the gap", "interrupt": "interrupted"}[found.stopped_by]
+    return (
+        f"searched: all walks of the roadmap from {shown(begin.place)}{to} of up to {found.max_length:.1f} m, "
+        f"{found.num_evaluations} of them evaluated; ended: {why}"
+    )
+
+
+def decide(planner: Planner, searched: Searched) -> Decision:
+    """The ways that were found as a decision, with its best way as the choice: it has the least value of all evaluated."""
+    decision = planner.decide(searched.proposals.actions, proof="optimal")
+    return replace(decision, best=searched.best)
