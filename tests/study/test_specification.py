@@ -108,7 +108,6 @@ def test_a_graph_in_space_is_refused(specification_file):
 def test_bounds_that_an_objective_does_not_have_are_refused(specification_file, family):
     text = specification_file.read_text().replace("[joint]", "[joint, error]").replace("rule: {", f"rule: {{bounds: {family}, ")
     specification_file.write_text(text)
-    families = "one of fischer, anchored, chain, auto"
-    message = f"study.yaml:11: rule.bounds: expected bounds that the objective \"error\" has, {families}, got '{family}'"
+    message = f"study.yaml:11: rule.bounds: expected one of fischer, anchored, chain, auto, got '{family}'"
     with pytest.raises(FileError, match=re.escape(message)):
         read_specification(specification_file)
