@@ -104,7 +104,8 @@ def test_exact_values_stand_apart_from_the_decision_that_did_not_need_them(topob
 
 
 def test_without_exact_values_none_is_computed(topobelief, office, tmp_path):
-    topobelief(office.plan("--candidates", 2, "--no-exact", "--proof", "bounded"))
+    """With bounds that do not compute them along the way."""
+    topobelief(office.plan("--candidates", 2, "--no-exact", "--proof", "bounded", "--objective", "map", "--bounds", "fischer"))
     written = json.loads((tmp_path / "out" / "decision.json").read_text())
     assert [action["exact_for_comparison"] for action in written["actions"]] == [None, None]
 
@@ -267,7 +268,8 @@ def test_exact_values_that_cannot_be_had_cost_neither_decision_nor_files(topobel
         raise IllConditionedError("joint entropy", 3.0)
 
     monkeypatch.setattr(Planner, "entropies", fails)
-    outcome = topobelief(office.plan("--candidates", 3, "--proof", "bounded", "--closures", "paper"))
+    choices = ["--proof", "bounded", "--closures", "paper", "--objective", "map", "--bounds", "fischer"]
+    outcome = topobelief(office.plan("--candidates", 3, *choices))
     assert (outcome.code, outcome.err) == (0, "")
     assert (
         "exact values in the picture: 3 of 3 could not be computed; joint entropy: the graph is too ill-conditioned"
