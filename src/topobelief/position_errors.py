@@ -25,7 +25,7 @@ from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg.estimate import Estimate
 from topobelief.linalg.inverse import InverseSolver
 
-_COMPILED_SIZE = 6000  # variables beyond which loading compiled kernels is worth its time
+_COMPILED_SIZE = 3500  # variables beyond which loading compiled kernels is worth its time
 
 
 @dataclass(frozen=True, slots=True)
