@@ -122,7 +122,10 @@ class Batch:
     @property
     def knows_entropies(self) -> bool:
         """Whether exact values cost nothing more, since bounds took the same increments."""
-        return all(self._criteria.objective_itself.known(forms) for _, forms in self._groups)
+        known = self._criteria.objective_itself.known
+        places = {place for places, forms in self._groups if known(forms) for place in places.tolist()}
+        places.update(place for place, forms in self._alone.items() if known(forms))
+        return len(places) == len(self._actions)
 
     @cached_property
     def _exact(self) -> Estimate[FloatArray]:
