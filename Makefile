@@ -16,14 +16,14 @@ $(STAMP): pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
 	$(BIN)/python -m compileall -q src
 	$(BIN)/python -c 'import matplotlib.font_manager' # builds its font cache
-	$(BIN)/python -m topobelief.planning.compile_kernels # once a machine, half a minute
+	$(BIN)/python -m topobelief.search.compile_kernels # once a machine, half a minute
 	@command -v chromium >/dev/null 2>&1 || { echo "installing chromium, for the tests of the report"; \
 	  { apt-get update && apt-get install -y --no-install-recommends chromium; } >/dev/null 2>&1 || echo "not installed: these tests are skipped"; }
 	touch $(STAMP)
 
 demo: install
 	$(BIN)/topobelief plan examples/office/recorded.g2o --map examples/office/recorded.yaml --goal 25 -2.95 \
-	  --max-detour 2.5 --out out/demo
+	  --max-detour 1.6 --seconds 10 --out out/demo
 
 test: install
 	$(BIN)/python -m pytest -n auto

@@ -352,7 +352,7 @@ Out = Annotated[
     Path | None,
     typer.Option(
         metavar="FOLDER",
-        help="Folder for paths.png, bounds.png and decision.json.",
+        help="Folder for paths.png and decision.json; of a list of candidates, bounds.png too.",
         show_default="out; with --json, none",
         rich_help_panel=_OUTPUT,
     ),

@@ -219,6 +219,7 @@ def _work(found: SearchResult, begin: Start, goal: Goal | None) -> str:
 
 
 def decide(planner: Planner, searched: Searched) -> Decision:
-    """The ways that were found as a decision, with its best way as the choice: it has the least value of all evaluated."""
+    """The ways that were found as a decision: its choice is the best way of the search, its ranking goes by value."""
     decision = planner.decide(searched.proposals.actions, proof="optimal")
-    return replace(decision, best=searched.best)
+    order = sorted(decision.ranking.tolist(), key=lambda index: (index != searched.best, decision.lower[index]))
+    return replace(decision, best=searched.best, ranking=np.array(order))
