@@ -15,6 +15,12 @@ OBJECTIVES = ("error", "map", "joint", "per_pose")
 WITH_WALKS = (4, 8, 17, 62, 85, 96, 106, 111)  # of cases with 15 to 70 walks
 
 
+@pytest.fixture(autouse=True)
+def _always_cells(monkeypatch):
+    """Cells as on long ways, where pieces are coarse; "joint" and "per_pose" have one cell anyway."""
+    monkeypatch.setattr("topobelief.search.flow_bound._FINE", 100)
+
+
 def _run(case: Case, objective: str, best: float, steps: int) -> tuple[FlowBound, list[tuple[int, ...]]]:
     """Steps without the best value and then with it; no bound on the way may exceed it."""
     bound = flow_bound(case.graph, case.roadmap, objective=objective, **case.arguments())

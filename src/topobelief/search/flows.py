@@ -22,7 +22,7 @@ from topobelief.linalg.block_cholesky import Int32Array
 from topobelief.search.criteria import Criterion
 from topobelief.search.cuts import best_line, best_place
 from topobelief.search.information_gain import gain_and_slopes
-from topobelief.search.layers import arcs_above, longest_path
+from topobelief.search.longest_paths import arcs_above, longest_path
 from topobelief.search.plans import Mixture
 from topobelief.search.reduced_prior import ReducedPrior
 from topobelief.search.rewards import Course, Rewards, allowed_arcs, used_records
@@ -36,7 +36,7 @@ _TOLL_TRIALS = 2  # longest paths a step, to find the price of a metre
 _STEPS_BEFORE_SPLIT = 3
 _SLOW = 0.15  # of what is missing to the value of the flow: a step that raises the bound by less is slow
 _CONVERGED = 0.25  # of what is missing to the best value: a part whose own optimum is known that well is split
-_SLOW_STEPS = 8  # after so many in a row a part is split too; a few more, and what cannot be split is left as it is
+_SLOW_STEPS = (3, 8)  # after so many in a row a part is split too, with one cell and with several; a few more, and it is left
 _LEAST_WEIGHT = 1e-3  # of walks that count where parts are split
 _SMALL_WEIGHT = 0.05  # of all walks of the active set, where those that count agree
 
@@ -76,6 +76,7 @@ class FlowBound:
         self._open: list[tuple[float, int, _Part]] = [(-math.inf, next(self._counter), whole)]
         self._begin, self._end = rewards.places()
         self._background = rewards.background()
+        self._slow_steps = _SLOW_STEPS[rewards.layers.num_labels > 1]
         self._num_arcs = len(every)
         self.num_steps = 0
 
@@ -120,7 +121,7 @@ class FlowBound:
             halves = self._split(part)
             if halves is not None:
                 parts = halves
-            elif part.slow >= _SLOW_STEPS + 3:
+            elif part.slow >= self._slow_steps + 3:
                 self._closed, parts = min(self._closed, part.bound), []
         found: list[IntArray] = []
         for each in parts:
@@ -189,7 +190,7 @@ class FlowBound:
         missing = self._best - max(part.bound, bound)
         converged = value - max(part.bound, bound) < _CONVERGED * missing if math.isfinite(missing) else False
         part.slow = part.slow + 1 if bound - part.bound < _SLOW * abs(value - part.bound) else 0
-        part.is_ready = converged or part.slow >= _SLOW_STEPS
+        part.is_ready = converged or part.slow >= self._slow_steps
         part.bound = max(part.bound, bound)
         if math.isfinite(threshold):
             self._thin(part, weights, lengths, threshold + offset - part.toll * self._max_length)

@@ -168,12 +168,13 @@ class _Posterior:
         if self.kind == "joint":
             identity = np.eye(len(self.variables) * kappa)
             inverse = cho_solve_banded((self.root_new, True), identity, check_finite=False)
-        begin: IntArray = np.searchsorted(self.variables, np.arange(count + 1) * cells)
+        first_of_each: IntArray = np.arange(count + 1, dtype=np.int64) * cells
+        begin: list[int] = np.searchsorted(self.variables, first_of_each).tolist()
         each = np.zeros((len(self.variables), kappa, kappa))
         odometry = np.zeros((count, cells, cells, kappa, kappa))
         before = slice(0, 0)
         for t in range(count):
-            here = slice(int(begin[t]), int(begin[t + 1]))
+            here = slice(begin[t], begin[t + 1])
             both = slice(before.start if t else here.start, here.stop)
             flat, to = (slice(part.start * kappa, part.stop * kappa) for part in (here, both))
             block = among[flat] @ self.lever[to].T
