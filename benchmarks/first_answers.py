@@ -53,7 +53,7 @@ def main() -> None:
         inner("joint_entropy of city10000 (the call alone)", "tb.joint_entropy", city, 0.3)
         inner("both Fischer bounds of city10000 (the call alone)", "tb.entropy_bounds", city, 0.2)
         goal = ["--goal", "0", "0", "--out", out]
-        row("topobelief plan, city10000, 20 candidates", plan(city, "--along-trajectory", *goal), 15.0, repeat=3)
+        row("topobelief plan, city10000", plan(city, "--along-trajectory", *goal), 15.0, repeat=3)
 
 
 def plan(graph: Path, *options: str) -> list[str]:

@@ -26,6 +26,7 @@ _ATTEMPTS = 160  # of which the radius is halved
 _LEAST_YIELD = 20  # where they bring fewer paths
 _HALVINGS = 4  # in the end balls, and differences, of 1/16 of the first radius
 _NUM_LANDMARKS = 64
+_ROUNDING = 1e-9  # relative: what differs by less counts as equal
 
 
 def diverse_paths(
@@ -85,7 +86,9 @@ def diverse_paths(
         )
     length = path_length(roadmap.vertices[shortest])
     radius = ball_radius * length
-    max_length = math.inf if max_detour is None else max_detour * length
+    max_length = (
+        math.inf if max_detour is None else max_detour * length * (1 + _ROUNDING)
+    )  # the shortest path is never too long
     rays = Rays.of_obstacles(roadmap, min_size=radius, max_length=max_length, max_rays=max_rays)
     straightening = Straightening(roadmap, rays)
     classes = shortest_paths_by_class(roadmap, rays, num_classes=num_paths, max_length=max_length)
