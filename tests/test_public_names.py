@@ -49,7 +49,7 @@ def test_importing_the_package_reads_no_metadata_and_draws_nothing():
         (tb.ReadingOptions(drop="planes", planar=True), "ReadingOptions(drop=['planes'], planar=True)"),
         (
             tb.DecisionQuality(0.0, 0.0301, True, False, 0.9981, math.nan, 1.0),
-            "DecisionQuality(error 0 nats, gamma 0.0301 nats, Spearman 0.998, Kendall nan, Pearson 1)",
+            "DecisionQuality(error 0, gamma 0.0301, Spearman 0.998, Kendall nan, Pearson 1)",
         ),
         (
             tb.Planner(GRAPH, objective="map"),

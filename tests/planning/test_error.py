@@ -245,7 +245,12 @@ def test_exact_values_come_with_bounds_by_increments():
 def test_a_decision_by_exact_values_says_so_and_keeps_them():
     graph, actions = a_session(10)
     planner = Planner(graph, engine="incremental", **ERROR)
-    decision = planner.decide(actions)
+    ranked = planner.decide(actions)
+    assert ranked.exact_bounds
+    assert (ranked.best, ranked.num_evaluations) == (ranked.ranking[0], 0)
+    few = planner.decide(actions, proof="optimal", max_evaluations=2)
+    assert few.num_evaluations <= 2
+    decision = planner.decide(actions, proof="optimal")
     np.testing.assert_array_equal(decision.entropies, planner.entropies(actions))
     assert decision.num_evaluations == len(actions)
     assert decision.exact_bounds
@@ -254,7 +259,7 @@ def test_a_decision_by_exact_values_says_so_and_keeps_them():
     assert "The exact values of all 10 were computed, since they cost no more than bounds." in decision.summary()
     assert Decision.from_dict(decision.to_dict()).exact_bounds
     one = planner.decide(actions, margin=1e3)
-    assert np.isfinite(one.entropies).sum() == one.num_evaluations == 1
+    assert one.num_evaluations == 0
     assert not one.exact_bounds
 
 
@@ -269,7 +274,7 @@ def test_after_many_closures_a_large_graph_is_factored_anew(monkeypatch):
     for module in (increments, inverse_traces):
         monkeypatch.setattr(module, "COMPILED_SIZE", 10)
     monkeypatch.setattr(increments, "_LEAST_HEAVY", 0)
-    found = Planner(graph, engine="incremental", **ERROR).decide([*actions, many])
+    found = Planner(graph, engine="incremental", **ERROR).decide([*actions, many], proof="optimal")
     assert evaluated == [many]
     np.testing.assert_allclose(found.entropies, expected, rtol=1e-9)
     np.testing.assert_allclose(found.signatures, signatures, rtol=1e-9)

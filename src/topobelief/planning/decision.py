@@ -136,7 +136,7 @@ class Decision(ReadOnlyArrays):
                 f"No candidate can be better by more than {quantity(self.error_bound, self.unit)}; "
                 f"{ruled_out} {'was' if ruled_out == 1 else 'were'} ruled out by bounds."
             )
-        elif self.exact_bounds and total > 1:
+        elif self.exact_bounds and not np.isnan(self.entropies).any() and total > 1:
             sentences.append(f"The exact values of all {total} were computed, since they cost no more than bounds.")
         elif self.proven_optimal and total > 1:
             count, skipped = self.num_evaluations, int(np.isnan(self.entropies).sum())

@@ -224,8 +224,7 @@ class Planner:
             "none": signatures only. "bounded": bounds of all actions. "optimal": exact evaluations along the ranking until
             no bound is below the best value found.
         max_evaluations
-            Maximum number of exact evaluations, beyond those that cost no more than bounds; the decision then has the
-            certificate reached so far.
+            Maximum number of exact evaluations; the decision then has the certificate reached so far.
         deadline
             Seconds from now, checked between actions. A ranking is always returned; bounds and evaluations may be missing.
         on_progress

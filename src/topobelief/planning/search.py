@@ -13,7 +13,7 @@ import numpy as np
 
 from topobelief.arrays import FloatArray, IntArray
 from topobelief.graph.action import Action, driven_lengths
-from topobelief.linalg.estimate import Estimate
+from topobelief.linalg.estimate import UNIT_ROUNDOFF, Estimate
 from topobelief.planning.batch import Batch, Criteria
 from topobelief.planning.decision import Candidate, Decision
 from topobelief.planning.engine import Engine
@@ -66,7 +66,7 @@ class Search:
         count = len(actions)
         self._costs = np.array([action.cost for action in actions])
         self._signatures, self._low, self._high, self._values = np.full((4, count), np.nan)
-        self._came_along = np.zeros(count, np.bool_)  # exact values that cost no more than bounds
+        self._exact_bounds: dict[int, tuple[float, float]] = {}  # values and errors that took the place of bounds
         self._first: IntArray = first_alike(actions)
         self._ranking: list[int] = []
 
@@ -96,8 +96,15 @@ class Search:
             self._clock.report("bounds", done, len(different))
 
     def prove(self, max_evaluations: int) -> None:
-        """Exact values along the ranking, skipping what a lower bound rules out, in batches that double."""
+        """Exact values along the ranking, skipping what a lower bound rules out, in batches that double.
+
+        Where bounds are the exact values, and no more of them than wanted, all are taken at once.
+        """
         if len(self._survivors()) == 1:
+            return
+        if self._bounds_are_exact and len(self._exact_bounds) <= max_evaluations:
+            for place, (value, error) in self._exact_bounds.items():
+                self._keep([place], Estimate(np.array([value]), np.array([error])))
             return
         evaluated, size = 0, 1
         while evaluated < max_evaluations and not self._clock.expired:
@@ -187,11 +194,18 @@ class Search:
         return Batch(self._engine, self._criteria, [self._actions[place] for place in places], places)
 
     def _bound(self, places: list[int], batch: Batch) -> None:
-        """Bounds, and exact values in their place where these came along at no cost."""
-        self._low[places], self._high[places] = batch.bounds()
+        """Bounds; where exact values come with them and lie as close, these are remembered."""
+        lower, upper = batch.bounds()
+        self._low[places], self._high[places] = lower, upper
         if batch.knows_entropies:
-            self._keep(places, batch.entropies())
-            self._came_along[places] = True
+            exact = batch.entropies()
+            if (upper - lower <= 2 * exact.error + 4 * UNIT_ROUNDOFF * np.abs(exact.value)).all():
+                pairs = zip(exact.value.tolist(), exact.error.tolist(), strict=True)
+                self._exact_bounds.update(zip(places, pairs, strict=True))
+
+    @property
+    def _bounds_are_exact(self) -> bool:
+        return len(self._exact_bounds) == len(self._different(range(len(self._actions))))
 
     def _keep(self, places: list[int], exact: Estimate[FloatArray]) -> None:
         self._values[places] = exact.value
@@ -232,7 +246,7 @@ class Search:
             error_bound=error_bound,
             margin_met=margin_met,
             num_evaluations=int(np.count_nonzero(~np.isnan(self._values))),
-            exact_bounds=bool(self._came_along[self._first].all()),
+            exact_bounds=margin_met is None and self._bounds_are_exact,
             proven_optimal=proven,
             candidates=tuple(
                 Candidate(

@@ -172,7 +172,7 @@ def _title(decision: Decision) -> str:
     ruled_out = total - len(decision.survivors)
     if total == 1:
         return f"{chosen}, the only candidate"
-    if decision.exact_bounds:
+    if decision.exact_bounds and decision.proven_optimal:
         return f"{chosen} has the least of the exact values of all {total} candidates"
     if np.isnan(decision.lower).any():
         return f"{chosen} is chosen among {total} candidates"

@@ -20,7 +20,7 @@ from topobelief.world import World
 
 _MAP_WIDTHS, _MAP_HEIGHT = (2.8, 4.6), 4.0  # inches
 _LEFT, _BOTTOM, _TOP, _RIGHT = 0.65, 0.50, 0.75, 0.20
-_GAP, _FRONT_WIDTH, _FRONT_HEIGHT = 0.95, 3.1, 2.1
+_GAP, _FRONT_WIDTH, _FRONT_HEIGHT = 0.95, 3.1, 1.85
 _FURTHEST = 3.0  # gains of the longest way; a bound further below is told, not drawn
 _AXES = {
     "error": "expected map error after it (cm)",
