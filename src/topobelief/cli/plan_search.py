@@ -26,7 +26,6 @@ from topobelief.planning.decision import Decision
 from topobelief.planning.planner import Planner
 from topobelief.search.anytime import SearchProgress
 from topobelief.search.result import SearchResult, Way, said
-from topobelief.search.roadmap_search import search_roadmap
 from topobelief.world import World
 
 POINTS_TOLD = 5
@@ -154,6 +153,8 @@ def _search_one(
     limits: Limits,
     reporter: Reporter,
 ) -> SearchResult:
+    from topobelief.search.roadmap_search import search_roadmap  # needs the extra fast
+
     place = None if goal is None else goal.place
     with reporter.stage("roadmap"), told_of_poses_outside(graph, world):
         roadmap = build_roadmap(world, begin.place, place, rule.num_vertices, rule.robot_radius, rule.seed)

@@ -141,7 +141,8 @@ class Decision(ReadOnlyArrays):
         elif self.proven_optimal and total > 1:
             count, skipped = self.num_evaluations, int(np.isnan(self.entropies).sum())
             skipped = f"; bounds ruled out the other {skipped}" if count and skipped else ""
-            evaluated = f"{count} exact evaluation{'s' if count > 1 else ''}" if count else "bounds alone"
+            bounds = "bounds, which here are the exact values" if self.exact_bounds else "bounds alone"
+            evaluated = f"{count} exact evaluation{'s' if count > 1 else ''}" if count else bounds
             sentences.append(f"That is proven by {evaluated}{skipped}.")
         return " ".join(sentences)
 
