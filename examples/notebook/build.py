@@ -79,8 +79,10 @@ def lines(text: str) -> list[str]:
 def run_notebook(cells: list[tuple[str, str]]) -> list[list[dict[str, Any]]]:
     """Outputs of each cell, in a folder of its own, beside a copy of the office."""
     import matplotlib as mpl
+    import matplotlib.pyplot as plt
 
     mpl.use("agg")
+    plt.close("all")  # figures that others left open are not of these cells
     names: dict[str, Any] = {"__name__": "__main__"}
     with tempfile.TemporaryDirectory() as scratch:
         shutil.copytree(HERE.parent / "office", Path(scratch) / "office")

@@ -437,7 +437,10 @@ def test_limits_that_make_no_sense_are_refused(limits, message):
 @pytest.mark.parametrize(
     ("choice", "message"),
     [
-        ({"objective": "total"}, 'expected objective to be one of "joint", "map", "per_pose", "error", got \'total\''),
+        (
+            {"objective": "total"},
+            'expected objective to be one of "joint", "map", "per_pose", "error", "focused", got \'total\'',
+        ),
         ({"signature": "trees"}, 'expected signature to be one of "spanning_trees", "von_neumann", "von_neumann_approx"'),
         ({"bounds": "psi"}, 'expected bounds to be one of "paper", "fischer"'),
         ({"determinant": "lu"}, 'expected determinant to be one of "cholesky", "hadamard", got \'lu\''),

@@ -98,6 +98,8 @@ class IncrementalForms(Forms[FloatArray], ClosureForms[FloatArray]):
 
     def log_det(self, form: FormName, *, shift: float | FloatArray = 0.0, part: Part = "all") -> Estimate[FloatArray]:
         """With a shift for each action, of those that have the most frequent one; the others are nan."""
+        if isinstance(part, tuple):  # no factor of the prior holds these
+            return Estimate(np.full(self._batch.count, np.nan), np.full(self._batch.count, np.inf))
         if part == "new":
             added = self._increments_of_new_poses(form)
             return Estimate(added.forest + added.closures_held, added.error)

@@ -92,7 +92,10 @@ class GraphForms(Forms[float]):
     def log_det(self, form: FormName, *, shift: float = 0.0, part: Part = "all") -> Estimate[float]:
         key = form, shift, part
         if key not in self._known:
-            self._known[key] = self._of_new_poses(form) if part == "new" else self._of_all_poses(form, shift)
+            if part == "new":
+                self._known[key] = self._of_new_poses(form)
+            else:
+                self._known[key] = self._of_all_poses(form, shift) if part == "all" else self._with_held(form, part)
         return self._known[key]
 
     def hadamard(self, form: FormName, *, shift: float = 0.0) -> Estimate[float]:
@@ -163,6 +166,9 @@ class GraphForms(Forms[float]):
             return Estimate(0.0, 0.0)
         form = self._form(name, self._new_rows)
         return LogDetSolver(form.edges, self.graph.num_poses, np.arange(self.num_existing)).log_det(form)
+
+    def _with_held(self, name: FormName, held: tuple[int, ...]) -> Estimate[float]:
+        return LogDetSolver(self.graph.edges, self.graph.num_poses, np.array(held)).log_det(self._form(name, self._rows))
 
     def _form(self, name: FormName, rows: FisherRows) -> EdgeForm:
         if name in ("trees_p", "trees_r"):

@@ -37,8 +37,11 @@ FormName = Literal["trees_p", "trees_r", "positions", "rotations", "rotations_gi
 PositionsName = Literal["positions", "joint"]
 RotationsName = Literal["rotations", "rotations_given_positions"]
 
-Part = Literal["all", "new"]
-"""The whole matrix, or the block of the new poses with all existing ones held."""
+Part = Literal["all", "new"] | tuple[int, ...]
+"""The whole matrix; the block of the new poses with all existing ones held; or what is left when these existing poses are held.
+
+The information of some poses alone has ln det M of all less ln det with these poses and the anchor held.
+"""
 
 Rows = Literal["all", "positions", "rotations"]
 """Which whitened rows of each loop closure."""

@@ -18,7 +18,7 @@ from topobelief.graph.action import Action
 from topobelief.linalg.estimate import Estimate
 from topobelief.objectives.objective import Objective
 from topobelief.planning.engine import Engine
-from topobelief.planning.registry import FAMILIES, OBJECTIVES, SIGNATURE_UNITS, SIGNATURES, chosen
+from topobelief.planning.registry import ALL_OBJECTIVES, FAMILIES, FOCUSED, SIGNATURE_UNITS, SIGNATURES, chosen
 from topobelief.signatures.options import SignatureOptions
 
 _may_overflow = np.errstate(over="ignore", divide="ignore", invalid="ignore")  # what is not finite is refused
@@ -33,11 +33,13 @@ class Criteria:
     bounds: str = "fischer"
     options: BoundOptions = field(default_factory=BoundOptions)
     normalized: bool = False
+    held: tuple[int, ...] = ()  # of the objective "focused"
 
     @property
     def objective_itself(self) -> Objective:
         """What the objective's name stands for."""
-        return chosen(OBJECTIVES, self.objective)
+        found = chosen(ALL_OBJECTIVES, self.objective)
+        return found(self.held) if self.objective == FOCUSED else found
 
     @property
     def families(self) -> Mapping[str, str]:

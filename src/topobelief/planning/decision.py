@@ -13,7 +13,7 @@ from topobelief.arrays import FloatArray, IntArray, ReadOnlyArrays, frozen_float
 from topobelief.errors import InvalidInputError
 from topobelief.io.json_values import without_nan
 from topobelief.planning.decision_table import as_html, as_text, decision_table
-from topobelief.planning.registry import OBJECTIVES, SIGNATURE_WORDS, chosen
+from topobelief.planning.registry import ALL_OBJECTIVES, SIGNATURE_WORDS, chosen
 from topobelief.planning.units import quantity, shown_factor, shown_unit
 from topobelief.wording import closures_in_words
 
@@ -103,17 +103,17 @@ class Decision(ReadOnlyArrays):
     @property
     def unit(self) -> str:
         """Of the objective, its bounds, costs and `error_bound`: "nats", "nats per pose" or "m"."""
-        return chosen(OBJECTIVES, self.objective).unit
+        return chosen(ALL_OBJECTIVES, self.objective).unit
 
     @property
     def quantity(self) -> str:
         """What is minimised, in words: "map entropy"."""
-        return chosen(OBJECTIVES, self.objective).quantity
+        return chosen(ALL_OBJECTIVES, self.objective).quantity
 
     @property
     def description(self) -> str:
         """What is minimised, where there is room: "entropy of the poses that exist now, after the action"."""
-        return chosen(OBJECTIVES, self.objective).description
+        return chosen(ALL_OBJECTIVES, self.objective).description
 
     def name(self, action: int) -> str:
         """What to call an action: its label, else its index."""

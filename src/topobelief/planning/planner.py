@@ -32,7 +32,7 @@ from topobelief.optional import has_kernels, missing_packages
 from topobelief.planning.batch import Batch, Criteria
 from topobelief.planning.decision import Decision
 from topobelief.planning.engine import Engine
-from topobelief.planning.registry import AUTO, BOUNDS, ENGINES, OBJECTIVES, SIGNATURES, chosen
+from topobelief.planning.registry import ALL_OBJECTIVES, AUTO, BOUNDS, ENGINES, FOCUSED, SIGNATURES, chosen
 from topobelief.planning.search import Clock, Progress, Search
 from topobelief.signatures.von_neumann import DENSE_SPECTRUM_SIZE, expected_spectrum_seconds
 
@@ -56,7 +56,8 @@ class Planner:
     objective
         "joint": entropy of all poses after the action, the paper's. "map": of the poses that exist now, free of units and
         recommended where paths differ in length. "per_pose": joint over the number of free poses. "error": the expected
-        error of the map, metres; costs, margins and bounds are then in metres too.
+        error of the map, metres; costs, margins and bounds are then in metres too. "focused": entropy of the poses in `focus`,
+        relative to the anchor; evaluated from scratch by either engine.
     signature
         What ranks the actions: "spanning_trees", "von_neumann" (dense spectrum), "von_neumann_approx" (degrees) or "resistance"
         (mean effective resistance, which goes with "error").
@@ -77,6 +78,8 @@ class Planner:
         small decisions are made in one process, "incremental" is faster.
     anchor
         Pose that the bounds hold. Default: the last one, where the robot is.
+    focus
+        Indices of existing poses, for the objective "focused".
     normalized
         Add the noise normalisation of s_ST to "von_neumann_approx" (the paper's last remark).
     sample_size
@@ -117,11 +120,12 @@ class Planner:
         window: int = 2,
         engine: str = AUTO,
         anchor: int | None = None,
+        focus: Sequence[int] | None = None,
         normalized: bool = False,
         sample_size: int = DEFAULT_SAMPLE_SIZE,
         allow_dense_spectrum: bool = False,
     ) -> None:
-        require_choice("objective", objective, OBJECTIVES)
+        require_choice("objective", objective, ALL_OBJECTIVES)
         require_choice("signature", signature, SIGNATURES)
         require_choice("engine", engine, (*ENGINES, AUTO))
         if engine == "incremental" and not has_kernels():
@@ -134,6 +138,9 @@ class Planner:
         self._allow_dense_spectrum = allow_dense_spectrum
         self._engines: dict[str, Engine] = {}
         self._graph, self._anchor = graph, self._checked(graph)
+        self._focus = _checked_focus(graph, objective, focus)
+        if self._focus:
+            self._criteria = replace(self._criteria, held=tuple(sorted({*self._focus, self._anchor})))
         warn_of_misfit(graph)
 
     def __repr__(self) -> str:
@@ -194,6 +201,7 @@ class Planner:
             window=criteria.options.window,
             engine=self._given_engine,
             anchor=self._given_anchor,
+            focus=self._focus or None,
             normalized=criteria.normalized,
             sample_size=self._sample_size,
             allow_dense_spectrum=self._allow_dense_spectrum,
@@ -327,6 +335,21 @@ class Planner:
                     edge=int(edge),
                     label=action.label,
                 )
+
+
+def _checked_focus(graph: PoseGraph, objective: str, focus: Sequence[int] | None) -> tuple[int, ...]:
+    """The poses in focus; none unless the objective asks for them."""
+    if (objective == FOCUSED) != (focus is not None):
+        raise InvalidInputError(
+            f'expected focus=[indices of poses] with objective="{FOCUSED}" and with no other, got {objective!r} and {focus!r}'
+        )
+    poses = tuple(int(pose) for pose in focus or ())
+    if focus is not None and not poses:
+        raise InvalidInputError("expected at least one pose in focus, got none")
+    for pose in poses:
+        if not 0 <= pose < graph.num_poses:
+            raise InvalidInputError(f"expected poses in focus from 0 to {graph.num_poses - 1}, got {pose}")
+    return poses
 
 
 def _cheapest_bounds(engine: Engine, criteria: Criteria, actions: Sequence[Action]) -> str:

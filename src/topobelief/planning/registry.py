@@ -15,6 +15,9 @@ OBJECTIVES = {
     "per_pose": "topobelief.objectives.per_pose:OBJECTIVE",
     "error": "topobelief.objectives.error:OBJECTIVE",
 }
+FOCUSED = "focused"
+ALL_OBJECTIVES = {**OBJECTIVES, FOCUSED: "topobelief.objectives.focused:FocusedEntropy"}
+"""Besides those that need no more than a name, one that is told which poses are in focus."""
 SIGNATURES = {
     "spanning_trees": "topobelief.signatures.spanning_trees:spanning_trees",
     "von_neumann": "topobelief.signatures.von_neumann:von_neumann",
@@ -72,12 +75,12 @@ def default_signature(objective: str) -> str:
 
 def has_bounds(objective: str, family: str) -> bool:
     """Whether there are bounds of an objective by a family; those that are left to the planner there always are."""
-    return family == AUTO or family in FAMILIES[chosen(OBJECTIVES, objective).argument]
+    return family == AUTO or family in FAMILIES[chosen(ALL_OBJECTIVES, objective).argument]
 
 
 def unit_of(objective: str) -> str:
     """Of an objective, by name (`planning.units` says how its numbers are shown)."""
-    return chosen(OBJECTIVES, objective).unit
+    return chosen(ALL_OBJECTIVES, objective).unit
 
 
 def chosen(choices: Mapping[str, str], name: str) -> Any:

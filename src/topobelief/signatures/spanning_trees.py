@@ -115,5 +115,5 @@ def weighted_trees(forms: TreeForms[Number], part: Part = "all") -> Estimate[Num
     positions, ratio = forms.log_det("trees_p", part=part), forms.weight_ratio
     if ratio is None:
         return float(k) * positions + float(q) * forms.log_det("trees_r", part=part)
-    num_nodes = forms.num_new if part == "new" else forms.num_free
+    num_nodes = forms.num_new if part == "new" else forms.num_free - (0.0 if part == "all" else len(part) - 1.0)
     return (float(k + q) * positions).plus(q * math.log(ratio) * num_nodes)
