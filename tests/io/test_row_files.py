@@ -37,5 +37,5 @@ def test_rows_come_back_from_json_to_the_last_bit() -> None:
 
 
 def test_numbers_of_numpy_are_numbers() -> None:
-    row = Row("a", np.int64(3), np.float64(0.5), np.bool_(True))  # type: ignore[arg-type]
+    row = Row("a", np.int64(3), np.float64(0.5), np.bool_(True))  # type: ignore[arg-type]  (what NumPy computes)
     assert json.dumps(json_rows([row])) == '[{"name": "a", "count": 3, "value": 0.5, "fine": true}]'

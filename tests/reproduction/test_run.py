@@ -112,4 +112,4 @@ def test_a_missing_pose_graph_is_named_before_any_work(tmp_path: Path) -> None:
 )
 def test_a_plan_that_cannot_be_measured_is_refused(changes: dict[str, object], message: str) -> None:
     with pytest.raises(InvalidInputError, match=message):
-        ReproductionPlan(**changes)  # type: ignore[arg-type]
+        ReproductionPlan(**changes)  # type: ignore[arg-type]  (wrong on purpose)

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from compared_plays import compared_run
 from topobelief.errors import InvalidInputError
 from topobelief.estimation import optimize
 from topobelief.graph.pose_graph import PoseGraph
@@ -68,23 +69,7 @@ def test_what_cannot_be_compared(name, message):
 
 
 def run(seed: int, strategy: str, error: float) -> ComparedRun:
-    return ComparedRun(
-        seed=seed,
-        strategy=strategy,
-        outcome="arrived",
-        chosen=1,
-        num_candidates=2,
-        planned=10.0,
-        shortest=9.0,
-        num_poses=30,
-        num_shared=20,
-        num_closures=4,
-        predicted=0.1,
-        error_shared=error,
-        error_all=error,
-        spread_shared=0.0,
-        error_before=0.5,
-    )
+    return compared_run(seed, strategy, error_shared=error, error_all=error)
 
 
 def test_a_summary_pairs_runs_by_seed():

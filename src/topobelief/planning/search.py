@@ -66,7 +66,8 @@ class Search:
         count = len(actions)
         self._costs = np.array([action.cost for action in actions])
         self._signatures, self._low, self._high, self._values = np.full((4, count), np.nan)
-        self._exact_bounds: dict[int, tuple[float, float]] = {}  # values and errors that took the place of bounds
+        self._free = Estimate(*np.full((2, count), np.nan))  # exact values that came with the bounds
+        self._exact_bounds = np.zeros(count, np.bool_)  # where bounds are no wider than the error of the exact value
         self._first: IntArray = first_alike(actions)
         self._ranking: list[int] = []
 
@@ -102,9 +103,9 @@ class Search:
         """
         if len(self._survivors()) == 1:
             return
-        if self._bounds_are_exact and len(self._exact_bounds) <= max_evaluations:
-            for place, (value, error) in self._exact_bounds.items():
-                self._keep([place], Estimate(np.array([value]), np.array([error])))
+        every = self._different(self._ranking)
+        if self._bounds_are_exact and len(every) <= max_evaluations:
+            self._evaluate(every)
             return
         evaluated, size = 0, 1
         while evaluated < max_evaluations and not self._clock.expired:
@@ -117,7 +118,7 @@ class Search:
             places = left[: min(size, max_evaluations - evaluated)]
             if not places:
                 return
-            self._keep(places, self._batch(places).entropies())
+            self._evaluate(places)
             evaluated += len(places)
             size = min(2 * size, self._engine.batch_size)
             self._clock.report("evaluations", evaluated, evaluated + len(left) - len(places))
@@ -194,20 +195,22 @@ class Search:
         return Batch(self._engine, self._criteria, [self._actions[place] for place in places], places)
 
     def _bound(self, places: list[int], batch: Batch) -> None:
-        """Bounds; where exact values come with them and lie as close, these are remembered."""
-        lower, upper = batch.bounds()
-        self._low[places], self._high[places] = lower, upper
+        """Bounds, and exact values where these cost nothing more."""
+        lower, upper = self._low[places], self._high[places] = batch.bounds()
         if batch.knows_entropies:
             exact = batch.entropies()
-            if (upper - lower <= 2 * exact.error + 4 * UNIT_ROUNDOFF * np.abs(exact.value)).all():
-                pairs = zip(exact.value.tolist(), exact.error.tolist(), strict=True)
-                self._exact_bounds.update(zip(places, pairs, strict=True))
+            self._free.value[places], self._free.error[places] = exact.value, exact.error
+            self._exact_bounds[places] = upper - lower <= 2 * exact.error + 4 * UNIT_ROUNDOFF * np.abs(exact.value)
 
     @property
     def _bounds_are_exact(self) -> bool:
-        return len(self._exact_bounds) == len(self._different(range(len(self._actions))))
+        return bool(self._exact_bounds[self._first].all())
 
-    def _keep(self, places: list[int], exact: Estimate[FloatArray]) -> None:
+    def _evaluate(self, places: list[int]) -> None:
+        """Exact values in place of bounds, those that came with bounds where they did."""
+        exact = Estimate(self._free.value[places], self._free.error[places])
+        if not np.isfinite(exact.value).all():
+            exact = self._batch(places).entropies()
         self._values[places] = exact.value
         self._low[places], self._high[places] = exact.value - exact.error, exact.value + exact.error
 

@@ -105,7 +105,7 @@ def attempt(work: Work[T, R], task: T) -> Outcome[R]:
         return Outcome(work(task), seconds=time.perf_counter() - begin)
     except TopobeliefError as error:
         return Outcome(None, f"{type(error).__name__}: {_one_line(error)}", time.perf_counter() - begin)
-    except Exception as error:
+    except Exception as error:  # whatever a task does, the run goes on and its row says what went wrong
         frame = extract_tb(error.__traceback__)[-1]
         place = f"{Path(frame.filename).name}:{frame.lineno}"
         return Outcome(None, f"{type(error).__name__}: {_one_line(error)} ({place})", time.perf_counter() - begin)

@@ -42,7 +42,7 @@ class WorkerProcess:
     """
 
     def __init__(self, *, one_thread: bool) -> None:
-        self._complaints: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  (closed with the process)
+        self._complaints: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  (lives as long as the process; `close` closes it)
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-m", "topobelief.runs.worker"],  # -P: nothing of the current folder
             stdin=subprocess.PIPE,

@@ -7,11 +7,11 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from topobelief.candidates.closures import ClosureModel
 from topobelief.candidates.roadmap import Roadmap
 from topobelief.errors import InvalidInputError, PlanningError, require_choice
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg.block_cholesky import Int32Array
-from topobelief.search.bound import ClosureRule
 from topobelief.search.criteria import Criterion
 from topobelief.search.flows import FlowBound
 from topobelief.search.layers import build_layers
@@ -38,7 +38,7 @@ def flow_bound(
     goal: int | None,
     max_length: float,
     objective: str,
-    closures: ClosureRule,
+    closures: ClosureModel,
     spacing: float,
     information: ArrayLike,
     closure_information: ArrayLike | None = None,

@@ -15,11 +15,11 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from topobelief.arrays import BoolArray, FloatArray, IntArray
+from topobelief.candidates.closures import ClosureModel
 from topobelief.candidates.polyline import distances_to_segments
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg.block_cholesky import Int32Array
 from topobelief.linalg.compiled import compiled
-from topobelief.search.bound import ClosureRule
 from topobelief.world import World
 from topobelief.world.sight import seen_parts
 
@@ -99,7 +99,7 @@ def cells_of_pieces(ways: Ways, delta: float, cell: float) -> Int32Array:
 
 
 def find_sightings(
-    graph: PoseGraph, ways: Ways, pose: int, delta: float, rule: ClosureRule, world: World | None, latest: int
+    graph: PoseGraph, ways: Ways, pose: int, delta: float, rule: ClosureModel, world: World | None, latest: int
 ) -> Sightings:
     """What is seen along each way.
 
@@ -133,7 +133,7 @@ def find_sightings(
 
 
 def _seen_along(
-    graph: PoseGraph, ways: Ways, pose: int, rule: ClosureRule, world: World | None, latest: int
+    graph: PoseGraph, ways: Ways, pose: int, rule: ClosureModel, world: World | None, latest: int
 ) -> tuple[IntArray, IntArray, FloatArray, FloatArray, FloatArray]:
     """Way, pose, and metres along the way from where to where it may be seen; and its height over the way, squared."""
     positions = graph.positions[:, :2]
@@ -164,7 +164,7 @@ def _seen_along(
     return way, seen, lower, upper, height[seen] ** 2
 
 
-def _aligned(graph: PoseGraph, ways: Ways, pose: int, way: IntArray, seen: IntArray, rule: ClosureRule) -> BoolArray:
+def _aligned(graph: PoseGraph, ways: Ways, pose: int, way: IntArray, seen: IntArray, rule: ClosureModel) -> BoolArray:
     relative = graph.group.between(ways.poses(graph, pose)[way], graph.poses[seen])
     turned = np.linalg.norm(graph.group.rotation_vector(relative), axis=1)
     return turned <= rule.angle * (1 + _ROUNDING) + _ROUNDING

@@ -6,53 +6,23 @@ The levels are those of Kitanov and Indelman (arXiv 1903.00927): sigma_p = 0.1 m
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from topobelief.arrays import FloatArray
 from topobelief.errors import InvalidInputError
 from topobelief.geometry import SE2_GROUP
-from topobelief.graph.information import block_isotropic
+from topobelief.graph.noise import Noise
 from topobelief.simulation.factor import Factor
 
 PHYSICAL = "physical"
 
 
-@dataclass(frozen=True, slots=True)
-class InjectedNoise:
-    """N(0, diag(sigma_p², sigma_p², sigma_theta²)) in the tangent at the measured pose.
+class InjectedNoise(Noise):
+    """Noise that is drawn and added to measurements."""
 
-    Attributes
-    ----------
-    sigma_p, sigma_theta
-        Metres and radians.
-    """
-
-    sigma_p: float
-    sigma_theta: float
-
-    def __post_init__(self) -> None:
-        if not (0 < self.sigma_p < math.inf and 0 < self.sigma_theta < math.inf):
-            raise InvalidInputError(
-                f"expected standard deviations above 0, got sigma_p = {self.sigma_p:g} and sigma_theta = {self.sigma_theta:g}"
-            )
-
-    @classmethod
-    def of_ratio(cls, xi: float, *, sigma_p: float = 0.1) -> InjectedNoise:
-        """The noise of a ratio xi = sigma_theta / sigma_p, rad/m."""
-        return cls(sigma_p, xi * sigma_p)
-
-    @property
-    def xi(self) -> float:
-        """sigma_theta / sigma_p, rad/m."""
-        return self.sigma_theta / self.sigma_p
-
-    @property
-    def information(self) -> FloatArray:
-        """Shape (3, 3)."""
-        return block_isotropic(self.sigma_p, self.sigma_theta)
+    __slots__ = ()
 
     def disturbed(self, measurements: FloatArray, *, rng: np.random.Generator) -> FloatArray:
         """Measurements with noise, shape (..., 3)."""

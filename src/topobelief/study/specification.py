@@ -13,13 +13,12 @@ from typing import Any, TypeVar, cast, get_args
 
 import numpy as np
 
-from topobelief.arrays import FloatArray
 from topobelief.bounds.entropy_bounds import Determinant
 from topobelief.candidates.closures import ClosureModel
 from topobelief.candidates.propose import CandidateRule
 from topobelief.errors import FileError
 from topobelief.estimation import optimize
-from topobelief.graph.information import block_isotropic
+from topobelief.graph.noise import Noise
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.files import StrPath
 from topobelief.io.floor_plan import read_world
@@ -41,24 +40,6 @@ _CLOSURE_KEYS = ("closure_radius", "closure_angle", "min_index_gap")  # of a rul
 def _default_candidates() -> CandidateRule:
     """As in `topobelief plan`, but with closures by a rule and poses by distance, as in the paper."""
     return CandidateRule(turn=None, closures=ClosureModel.by_hand())
-
-
-@dataclass(frozen=True, slots=True)
-class Noise:
-    """Standard deviations of a relative measurement, metres and radians."""
-
-    sigma_p: float
-    sigma_theta: float
-
-    @property
-    def xi(self) -> float:
-        """ξ = σ_θ/σ_p of the paper."""
-        return self.sigma_theta / self.sigma_p
-
-    @property
-    def information(self) -> FloatArray:
-        """Shape (3, 3)."""
-        return block_isotropic(self.sigma_p, self.sigma_theta)
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,8 +13,9 @@ from hashlib import blake2b
 
 import numpy as np
 
+from topobelief.graph.noise import Noise
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.study.specification import Noise, Rule, Session, Specification
+from topobelief.study.specification import Rule, Session, Specification
 from topobelief.world import World
 
 _RESULTS = 1  # raise it where the same task comes to have another result
