@@ -233,16 +233,26 @@ def driven_lengths(graph: PoseGraph, actions: Sequence[Action]) -> list[float]:
 
     Those are taken in their order, from the old pose that the first of them is joined to by the earliest such edge.
     """
-    return [_length_from_pose_to_pose(graph, action) if action.length is None else action.length for action in actions]
-
-
-def _length_from_pose_to_pose(graph: PoseGraph, action: Action) -> float:
-    if action.num_new_poses == 0:
-        return 0.0
-    low, high = np.sort(action.edges, axis=1).T
-    start = low[(low < graph.num_poses) & (high == graph.num_poses)][:1]  # empty where only later poses are joined to the graph
-    path = np.concatenate([graph.positions[start], graph.group.position(action.poses)])
-    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+    lengths = [0.0 if action.length is None else action.length for action in actions]
+    unknown = [index for index, action in enumerate(actions) if action.length is None and action.num_new_poses]
+    if not unknown:
+        return lengths
+    num_new = np.array([actions[index].num_new_poses for index in unknown])
+    places = graph.group.position(np.concatenate([actions[index].poses for index in unknown]))
+    first = np.cumsum(num_new) - num_new
+    steps = np.diff(places, axis=0, prepend=places[:1])
+    steps[first] = 0.0  # where only later poses are joined to the graph, the way begins at the first of them
+    source, target = np.concatenate([actions[index].edges for index in unknown]).T
+    low, high = np.minimum(source, target), np.maximum(source, target)
+    which = np.repeat(np.arange(len(unknown)), [len(actions[index].edges) for index in unknown])
+    joining = np.flatnonzero((low < graph.num_poses) & (high == graph.num_poses))
+    joined, earliest = np.unique(which[joining], return_index=True)
+    steps[first[joined]] = places[first[joined]] - graph.positions[low[joining[earliest]]]
+    for index, length in zip(
+        unknown, np.add.reduceat(np.sqrt(np.einsum("ij,ij->i", steps, steps)), first).tolist(), strict=True
+    ):
+        lengths[index] = length
+    return lengths
 
 
 def posterior(graph: PoseGraph, action: Action) -> PoseGraph:
