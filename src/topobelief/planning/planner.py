@@ -339,10 +339,10 @@ class Planner:
 
 def _checked_focus(graph: PoseGraph, objective: str, focus: Sequence[int] | None) -> tuple[int, ...]:
     """The poses in focus; none unless the objective asks for them."""
-    if (objective == FOCUSED) != (focus is not None):
-        raise InvalidInputError(
-            f'expected focus=[indices of poses] with objective="{FOCUSED}" and with no other, got {objective!r} and {focus!r}'
-        )
+    if objective == FOCUSED and focus is None:
+        raise InvalidInputError(f'expected focus=[indices of poses] with objective="{FOCUSED}", got none')
+    if objective != FOCUSED and focus is not None:
+        raise InvalidInputError(f'expected focus= with objective="{FOCUSED}" only, got it with "{objective}"; leave it out')
     poses = tuple(int(pose) for pose in focus or ())
     if focus is not None and not poses:
         raise InvalidInputError("expected at least one pose in focus, got none")
