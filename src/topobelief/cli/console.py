@@ -26,10 +26,12 @@ class Reporter:
     ----------
     as_json
         Whether a program listens.
+    shows_progress
+        Whether stages show while they last, where a terminal can show them; a terminal shows one at a time.
     """
 
-    def __init__(self, *, as_json: bool) -> None:
-        self.as_json = as_json
+    def __init__(self, *, as_json: bool, shows_progress: bool = True) -> None:
+        self.as_json, self._shows_progress = as_json, shows_progress
         self.seconds: dict[str, float] = {}
         self.notes: list[str] = []
         self._answer = Console(width=None if sys.stdout.isatty() else _PIPE_WIDTH, highlight=False)
@@ -79,7 +81,9 @@ class Reporter:
     def _timed(self, name: str, *columns: ProgressColumn) -> Generator[tuple[Progress, TaskID]]:
         begin = time.perf_counter()
         shown = (SpinnerColumn(), TextColumn("{task.description}"), *columns, TimeElapsedColumn())
-        with Progress(*shown, console=self._progress, transient=True, disable=not self._progress.is_terminal) as bar:
+        with Progress(
+            *shown, console=self._progress, transient=True, disable=not (self._shows_progress and self._progress.is_terminal)
+        ) as bar:
             yield bar, bar.add_task(name, total=None)
         self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - begin
 

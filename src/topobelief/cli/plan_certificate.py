@@ -32,9 +32,16 @@ def say_search(searched: Searched, decision: Decision, errors: PlanErrors, limit
     nothing = not found.sees_map and found.stopped_by in ("proof", "rest")
     if nothing:
         reporter.say(f"Nothing to gain within {found.max_length:.1f} m: no place in reach sees the map again.")
-    reporter.say(answer(searched.proposals, decision, errors) if searched.has_goal else _trip(found, decision, errors, limits))
+    reporter.say(headline(searched, decision, errors, limits))
     if not nothing:
         reporter.say(certificate(searched, limits), front_table(found, POINTS_TOLD, names=searched.names))
+
+
+def headline(searched: Searched, decision: Decision, errors: PlanErrors, limits: Limits) -> str:
+    """What to drive, and what that does to the map."""
+    if searched.has_goal:
+        return answer(searched.proposals, decision, errors)
+    return _trip(searched.found, decision, errors, limits)
 
 
 def _trip(found: SearchResult, decision: Decision, errors: PlanErrors, limits: Limits) -> str:

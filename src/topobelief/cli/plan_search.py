@@ -120,13 +120,26 @@ def search(
         Where a goal cannot be reached, or not within the length.
     """
     results: list[SearchResult] = []
-    listed: list[_Listed] = []
-    for number, goal in enumerate(goals or [None]):
+    for goal in goals or [None]:
         seconds = None if limits.seconds is None else limits.seconds / max(1, len(goals))
         found = _search_one(graph, world, begin, goal, rule, objective, replace(limits, seconds=seconds), reporter)
         reporter.say(_work(found, begin, goal))
         results.append(found)
-        listed += [_Listed(way, None if goal is None else number) for way in _ways(found)]
+    return gathered(results, goals)
+
+
+def gathered(results: Sequence[SearchResult], goals: Sequence[Goal], *, points: int = POINTS_TOLD) -> Searched:
+    """The ways that searches found as candidates, shortest first.
+
+    Parameters
+    ----------
+    results
+        One to each goal, or one where there is none.
+    goals
+    points
+        How many ways of each front to name at most.
+    """
+    listed = [_Listed(way, number if goals else None) for number, found in enumerate(results) for way in _ways(found, points)]
     listed.sort(key=lambda each: each.way.length)
     chosen = min(results, key=lambda found: found.value)
     labels = [_label(index, each, goals) for index, each in enumerate(listed)]
@@ -179,13 +192,13 @@ def _search_one(
             information=rule.information,
             start=begin,
             seed=rule.seed,
-            on_progress=lambda progress: update(_progress(progress, objective)),
+            on_progress=lambda progress: update(progress_told(progress, objective)),
         )
 
 
-def _ways(found: SearchResult) -> list[Way]:
+def _ways(found: SearchResult, points: int) -> list[Way]:
     """Those that are worth telling, each once: on the front first, so that its points have names."""
-    few = found.few_places(POINTS_TOLD)
+    few = found.few_places(points)
     ways: list[Way] = [found.on_front[place] for place in few]
     for way in (found.best, *([] if found.shortest is None else [found.shortest]), *found.alternatives):
         if not any(_same(way, other) for other in ways):
@@ -203,7 +216,8 @@ def _label(index: int, listed: _Listed, goals: Sequence[Goal]) -> str:
     return f"path {index}" + (f" to {goals[listed.goal].name}" if listed.goal is not None and len(goals) > 1 else "")
 
 
-def _progress(progress: SearchProgress, objective: str) -> str:
+def progress_told(progress: SearchProgress, objective: str) -> str:
+    """How far a search is."""
     known = "" if math.isinf(progress.lower_bound) else f", none below {said(progress.lower_bound, objective)}"
     return f"{progress.num_evaluations} ways: best {said(progress.value, objective)}{known}"
 

@@ -4,30 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
 import re
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from browsers import browser_test, chromium
 from reproductions import smallest_reproduction
 from topobelief.report.canvas import save_figure
 from topobelief.report.reproduction.figures import NamedFigure, figures_of
 from topobelief.report.reproduction.page import page
 from topobelief.reproduction.planning_sessions import cases
-
-CHROMIUM = os.environ.get("TOPOBELIEF_CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
-FLAGS = [
-    *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
-    *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
-]
-browser_test = pytest.mark.skipif(
-    CHROMIUM is None, reason="no chromium: install the system's package, or name the program in TOPOBELIEF_CHROMIUM"
-)
-
 
 LONELIEST_POINT = """(() => {
     const map = document.getElementById('map'), paths = map.data.filter((t) => t.meta !== undefined), shown = map.data.at(-1);
@@ -95,11 +84,8 @@ def test_every_figure_can_be_drawn_as_png_and_pdf(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    playwright = pytest.importorskip("playwright.sync_api")
-    with playwright.sync_playwright() as started:
-        chromium = started.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield chromium
-        chromium.close()
+    with chromium() as started:
+        yield started
 
 
 @pytest.fixture(params=[(1280, 900), (390, 844)], ids=["desktop", "phone"])

@@ -1,0 +1,93 @@
+"""`topobelief serve`: a page of a pose graph and its map on which one clicks goals and sees the best ways, and why."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from topobelief.cli import plan_options as options
+from topobelief.cli.extras import require_extras
+from topobelief.cli.reading import Component, Drop, Edge2OrderOption, Planar, RobustAsPlain, reading_options
+
+_SERVER = "The server"
+_TRIP = 30.0  # metres; of a trip without a goal unless another length is asked for
+
+MaxDetour = Annotated[
+    float,
+    typer.Option(
+        metavar="FACTOR", min=1.0, help="Longest way to a goal unless the page says another, in lengths of the shortest."
+    ),
+]
+Seconds = Annotated[float, typer.Option(metavar="S", min=0.1, help="How long a question is searched at most.")]
+Host = Annotated[
+    str,
+    typer.Option(
+        help="Address to listen on. Other than this machine's own, the page needs the token that is printed.",
+        rich_help_panel=_SERVER,
+    ),
+]
+Port = Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 for any free one.", rich_help_panel=_SERVER)]
+
+
+def serve(
+    graph_file: options.GraphFile,
+    start: options.Start = None,
+    map_file: options.MapFile = None,
+    along_trajectory: options.AlongTrajectory = False,
+    width: options.Width = None,
+    unknown: options.UnknownCells = "occupied",
+    robot_radius: options.RobotRadius = 0.35,
+    vertices: options.Vertices = 1000,
+    seed: options.Seed = 0,
+    spacing: options.Spacing = 1.0,
+    max_detour: MaxDetour = 1.3,
+    seconds: Seconds = 5.0,
+    optimize: options.Optimize = True,
+    host: Host = "127.0.0.1",
+    port: Port = 8177,
+    drop: Drop = None,
+    robust_as_plain: RobustAsPlain = False,
+    edge2_order: Edge2OrderOption = "toro",
+    component: Component = "all",
+    planar: Planar = False,
+) -> None:
+    """Plan on a page: click a goal, see the best ways, what they see again, and why others are worse.
+
+    Serves the page to this machine alone, until Ctrl-C; it needs no network.
+    """
+    if (map_file is None) == (not along_trajectory):
+        raise typer.BadParameter("expected one of --map FILE and --along-trajectory.", param_hint="the world")
+    require_extras("fast")
+    from topobelief.candidates.propose import CandidateRule
+    from topobelief.cli import plan_ends, plan_stages, plan_world
+    from topobelief.cli.console import Reporter
+    from topobelief.cli.page_answers import Answers
+    from topobelief.errors import InvalidInputError
+    from topobelief.page import situation
+    from topobelief.page.server import PageServer
+    from topobelief.wording import counted
+
+    reporter = Reporter(as_json=False)
+    reading = reading_options(
+        drop, robust_as_plain=robust_as_plain, edge2_order=edge2_order, component=component, planar=planar
+    )
+    graph = plan_stages.read_graph(graph_file, reporter, optimized=optimize, reading=reading)
+    world = plan_world.read_world(map_file, graph, reporter, width=width, unknown=unknown)
+    begin = plan_ends.choose_start(graph, world, reporter, start)
+    rule = CandidateRule(num_vertices=vertices, robot_radius=robot_radius, seed=seed, spacing=spacing)
+    answers = Answers(graph, world, begin, rule, max_detour, seconds)
+    with reporter.stage("roadmap"):
+        reporter.say(str(answers.models["learned"]), f"roadmap: {counted(len(answers.roadmap.vertices), 'vertex', 'vertices')}")
+    models = [(name, f"{name}: {str(model).removeprefix('closures: ')}") for name, model in answers.models.items()]
+    shown = situation.document(Path(graph_file).name, graph, world, begin, models, trip=_TRIP)
+    try:
+        server = PageServer(shown, answers, host=host, port=port)
+    except OSError as error:
+        raise InvalidInputError(
+            f"expected a free port of an address of this machine, got {host}:{port} ({error.strerror}); choose another --port"
+        ) from None
+    with server:
+        reporter.say(f"Open {server.address} in a browser; Ctrl-C ends the server.")
+        server.serve_forever(poll_interval=0.2)
