@@ -25,6 +25,7 @@ from .graph.pose_graph import PoseGraph as PoseGraph
 from .graph.projection import projected_to_plane as projected_to_plane
 from .graph.topology import Topology as Topology
 from .io.datasets import dataset_path as dataset_path
+from .io.fetching import fetch_dataset as fetch_dataset
 from .io.floor_plan import read_walls as read_walls
 from .io.floor_plan import read_world as read_world
 from .io.formats import read_pose_graph as read_pose_graph
