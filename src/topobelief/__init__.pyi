@@ -39,6 +39,8 @@ from .io.ros_map import read_ros_map as read_ros_map
 from .io.ros_map import write_ros_map as write_ros_map
 from .io.toro import read_toro as read_toro
 from .io.toro import write_toro as write_toro
+from .measurement_selection import Selection as Selection
+from .measurement_selection import select_measurements as select_measurements
 from .planning.decision import Decision as Decision
 from .planning.decision_quality import DecisionQuality as DecisionQuality
 from .planning.decision_quality import decision_quality as decision_quality
