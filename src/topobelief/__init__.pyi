@@ -25,6 +25,7 @@ from .graph.pose_graph import PoseGraph as PoseGraph
 from .graph.projection import projected_to_plane as projected_to_plane
 from .graph.topology import Topology as Topology
 from .io.datasets import dataset_path as dataset_path
+from .io.fetching import fetch_dataset as fetch_dataset
 from .io.floor_plan import read_walls as read_walls
 from .io.floor_plan import read_world as read_world
 from .io.formats import read_pose_graph as read_pose_graph
@@ -38,6 +39,8 @@ from .io.ros_map import read_ros_map as read_ros_map
 from .io.ros_map import write_ros_map as write_ros_map
 from .io.toro import read_toro as read_toro
 from .io.toro import write_toro as write_toro
+from .measurement_selection import Selection as Selection
+from .measurement_selection import select_measurements as select_measurements
 from .planning.decision import Decision as Decision
 from .planning.decision_quality import DecisionQuality as DecisionQuality
 from .planning.decision_quality import decision_quality as decision_quality

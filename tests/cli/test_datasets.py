@@ -13,7 +13,7 @@ def test_the_list_names_each_with_its_file(topobelief, tmp_path, monkeypatch):
     outcome = topobelief(["datasets"])
     assert outcome.code == 0
     assert all(name in outcome.out for name in DATASETS)
-    assert f"Files that are not there may be put into {tmp_path} or " in outcome.out
+    assert f"Others may be put into {tmp_path} or " in outcome.out
     document = json.loads(topobelief(["datasets", "--json"]).out)
     assert [entry["name"] for entry in document["datasets"]] == list(DATASETS)
     assert document["datasets"][0]["path"] == str(tmp_path / "intel.g2o")

@@ -18,7 +18,7 @@ from topobelief.graph.action import Action, posterior
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.g2o import read_g2o, write_g2o
 from topobelief.planning.planner import Planner
-from topobelief.symbols import node_name
+from topobelief.symbols import id_of_key, node_name
 
 UNIT = gtsam.noiseModel.Unit.Create(3)
 
@@ -102,11 +102,51 @@ def test_arguments_of_other_types_are_refused():
         from_gtsam(None, values)
 
 
-def test_keys_too_large_for_ids_are_refused():
+def test_any_key_becomes_an_id_and_the_key_again():
+    """Keys of all 64 bits, in their order: a symbol with a character beyond ASCII, a labelled one, and plain numbers."""
+    keys = [0, gtsam.symbol("x", 4), gtsam.mrsymbol(ord("z"), ord("B"), 7), 2**63, (0xE9 << 56) + 3, 2**64 - 2]
     values = gtsam.Values()
-    values.insert(2**63, gtsam.Pose2())
-    with pytest.raises(InvalidInputError, match=r"expected keys below 2\^63, got 9223372036854775808"):
-        from_gtsam(_graph_with(), values)
+    for key in keys:
+        values.insert(key, gtsam.Pose2())
+    factors = _graph_with(*(gtsam.BetweenFactorPose2(*pair, gtsam.Pose2(1, 0, 0), UNIT) for pair in pairwise(keys)))
+    graph = from_gtsam(factors, values)
+    assert graph.edges.tolist() == [[index, index + 1] for index in range(5)]
+    assert [graph.label(index) for index in (1, 2, 4)] == ["x4", "zB7", "é3"]
+    assert [graph.index(key) for key in keys] == list(range(6))
+    assert graph.index("é3") == 4
+    back, values_again = to_gtsam(graph)
+    assert list(values_again.keys()) == keys
+    assert [tuple(back.at(index).keys()) for index in range(5)] == list(pairwise(keys))
+    with pytest.raises(InvalidInputError, match="expected the id or label of a pose, as 0 or -2, got 'x5'"):
+        graph.index("x5")
+
+
+def test_a_planner_on_objects_of_gtsam_says_what_makes_a_graph_of_them():
+    with pytest.raises(
+        InvalidInputError, match="expected a PoseGraph, got ISAM2; from_gtsam makes one of factors and values, or"
+    ):
+        Planner(gtsam.ISAM2())
+
+
+def test_the_entropy_of_chosen_poses_is_that_of_gtsam_s_joint_marginal():
+    """x1 and é2 together, given the first pose, after each of two actions."""
+    keys = [gtsam.symbol("x", 0), gtsam.symbol("x", 1), (0xE9 << 56) + 1, (0xE9 << 56) + 2]
+    poses = [[0, 0, 0], [1, 0, 0.2], [2, 0.3, 0.5], [2.5, 1, 1.4]]
+    omega = np.diag([50.0, 60, 200])
+    factors, values = to_gtsam(PoseGraph(poses, list(pairwise(range(4))), None, omega, ids=list(map(id_of_key, keys))))
+    graph = from_gtsam(factors, values)
+    focus = [graph.index("x1"), graph.index("é2")]
+    planner = Planner(graph, objective="focused", focus=focus, anchor=0)
+    for action in (Action([[2, 2, 3]], [(3, 4), (4, 1)], omega), Action([], [(3, 0)], omega)):
+        new_factors, new_values = action_to_gtsam(graph, action)
+        all_factors, all_values = _graph_with(), gtsam.Values(values)
+        for part in (factors, new_factors, _graph_with(gtsam.PriorFactorPose2(keys[0], gtsam.Pose2(*poses[0]), UNIT))):
+            all_factors.push_back(part)
+        all_values.insert(new_values)
+        joint = gtsam.Marginals(all_factors, all_values).jointMarginalInformation([keys[0], keys[1], keys[3]])
+        given_the_first = joint.fullMatrix()[3:, 3:]
+        theirs = 3 * np.log(2 * np.pi * np.e) - np.linalg.slogdet(given_the_first)[1] / 2
+        assert planner.entropies([action])[0] == pytest.approx(theirs, abs=1e-8)
 
 
 def _graph_with(*factors: object) -> gtsam.NonlinearFactorGraph:
@@ -155,11 +195,6 @@ def test_values_that_are_no_poses_are_refused():
         from_gtsam(gtsam.NonlinearFactorGraph(), values)
     with pytest.raises(InvalidInputError, match="expected at least one value, got none"):
         from_gtsam(gtsam.NonlinearFactorGraph(), gtsam.Values())
-
-
-def test_negative_ids_are_no_keys():
-    with pytest.raises(InvalidInputError, match="expected ids from 0 as GTSAM keys, got -1"):
-        to_gtsam(PoseGraph([[0, 0, 0]], [], None, np.eye(3), ids=[-1]))
 
 
 def test_a_robust_factor_is_the_gaussian_of_its_linearisation():

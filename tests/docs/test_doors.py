@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bag_files import Messages, write_bag
 from door_files import INFORMATION, LIST, SPHERE, STRIP, Database, marker, message
 from topobelief.cli.app import run
 from topobelief.geometry import SE2_GROUP
@@ -64,6 +65,15 @@ def write_files(recipe: str) -> None:
         ends = [places[index] for edge in graph.edges.tolist() for index in edge]
         text = message(*spheres, marker("slam_toolbox_edges", 0, LIST, ends))
     Path("graph.yaml").write_text(text)
+    if recipe.startswith("Bags"):
+        made = Messages()
+        spots = [(x + 0.01 * (index >= 48), y) for index, (x, y) in enumerate(places)]
+        bodies = [made.marker("poses", index, SPHERE, at=spot) for index, spot in enumerate(spots)]
+        lines = made.marker("edges", 0, LIST, [spots[index] for edge in graph.edges.tolist() for index in edge])
+        grid = made.grid(np.zeros((20, 20)), 0.5, (-2, -2))
+        topics = {"/odom": [made.odometry(*pose) for pose in poses.tolist()], "/map": [grid]}
+        topics["/slam_toolbox/graph_visualization"] = [made.markers(*bodies, lines)]
+        write_bag(Path(), "ROS 2 MCAP", made, topics)
     half = poses[:, 2] / 2
     tum = np.column_stack([np.arange(len(poses)), poses[:, :2], 0 * half, 0 * half, 0 * half, np.sin(half), np.cos(half)])
     np.savetxt("poses.tum", tum, fmt="%.9f")

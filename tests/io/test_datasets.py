@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 
 import pytest
@@ -26,6 +27,14 @@ def test_a_data_set_is_what_the_list_says(name: str):
         assert value in dataset.note
 
 
+def test_a_file_that_can_be_fetched_is_the_one_that_was_counted():
+    for dataset in DATASETS.values():
+        assert dataset.home.startswith("https://")
+        assert bool(dataset.address) == bool(dataset.sha256)
+        if dataset.address:
+            assert hashlib.sha256(data_file(dataset.file).read_bytes()).hexdigest() == dataset.sha256
+
+
 def test_the_given_folder_goes_first_then_the_cache_then_gtsam(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setattr("sys.platform", "linux")
@@ -44,8 +53,12 @@ def test_an_absent_file_says_where_it_goes(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setattr("sys.platform", "linux")
     monkeypatch.setenv("TOPOBELIEF_DATA", str(tmp_path / "data"))
-    with pytest.raises(InvalidInputError, match=r"expected intel.g2o in .*data or .*datasets, got none; put the file there$"):
+    with pytest.raises(
+        InvalidInputError, match=r"expected intel.g2o in .*data or .*datasets, got none; put the file there; it is published at"
+    ):
         dataset_path("intel")
+    with pytest.raises(InvalidInputError, match=r"put the file there, or fetch it with `topobelief datasets csail`"):
+        dataset_path("csail")
     monkeypatch.setattr("topobelief.io.datasets.find_spec", lambda _: None)
     with pytest.raises(InvalidInputError, match=r"put the file there, or install GTSAM, which brings it: pip install"):
         dataset_path("w100")

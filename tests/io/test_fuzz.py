@@ -12,45 +12,13 @@ from pathlib import Path
 
 import pytest
 
+from graph_texts import PLANAR, SPATIAL, TORO
 from topobelief.errors import ReadingWarning, TopobeliefError
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.formats import read_pose_graph
 from topobelief.io.g2o import read_g2o
 from topobelief.io.toro import read_toro
 
-IDENTITY = "0 0 0 0 0 0 1"
-UNIT_3D = "1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1"
-PLANAR = """# a loop
-PARAMS_SE2OFFSET 0 0 0 0
-VERTEX_SE2 0 0 0 0
-VERTEX_SE2 1 1 0 0.5
-VERTEX_SE2 2 1 1 3
-FIX 0
-EDGE_SE2 0 1 1 0 0.5 1 0 0 1 0 1
-EDGE_SE2 1 2 1 0 2.5 2 0.5 0 2 0 3
-EDGE_SE2 2 3 1 0 0 1 0 0 1 0 1
-EDGE_SE2 0 2 1 1 3 1 0 0 1 0 1
-EDGE_SE2_PRIOR 0 0 0 0 1 0 0 1 0 1
-VERTEX_SWITCH 9 1
-EDGE_SWITCH_PRIOR 9 1 1
-EDGE_SE2_SWITCHABLE 2 0 9 1 0 0 1 0 0 1 0 1
-EDGE_SE2_MAXMIX 2 0 0.1 1 0 0 1 0 0 1 0 1
-"""
-SPATIAL = f"""VERTEX_SE3:QUAT 0 {IDENTITY}
-VERTEX_SE3:QUAT 8646911284551352321 {IDENTITY}
-VERTEX_PLANE 4 0 0 1 0
-FIX 4 0
-EDGE_SE3:QUAT 0 8646911284551352321 {IDENTITY} {UNIT_3D}
-EDGE_SE3:QUAT 8646911284551352321 0 {IDENTITY} {UNIT_3D}
-EDGE_SE3_PLANE 0 4 0 0 1 0 1 0 0 1 0 1
-"""
-TORO = """VERTEX2 0 0 0 0
-VERTEX2 1 1 0 0
-EDGE2 0 1 1 0 0 1 0 1 1 0 0
-EDGE2 1 2 1 0 0 1 0 1 1 0 0
-EDGE2 0 2 2 0 0 1 0 1 1 0 0
-EQUIV 0 1
-"""
 ODD = [
     "",
     "#",

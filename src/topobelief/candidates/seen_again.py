@@ -10,7 +10,6 @@ import numpy as np
 from topobelief.arrays import BoolArray
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.symbols import node_name
 from topobelief.wording import closures_in_words
 
 _GAP = 3  # poses; one stretch goes on across fewer that are not seen
@@ -29,7 +28,7 @@ class Stretch:
 
     def name(self, graph: PoseGraph) -> str:
         """Its first and last pose, by what the file calls them: "31 to 46"."""
-        first, last = (node_name(int(graph.ids[index])) for index in (self.first, self.last))
+        first, last = (graph.label(index) for index in (self.first, self.last))
         return first if self.first == self.last else f"{first} to {last}"
 
 

@@ -115,7 +115,7 @@ def _size(graph: PoseGraph) -> Iterator[Fact]:
     yield Fact("num_edges", graph.num_edges, "edges", str(graph.num_edges))
     yield Fact("num_loop_closures", closures, "of these loop closures", f"{closures} (not between consecutive poses)")
     yield Fact("num_parallel_edges", parallel, "of these parallel", f"{parallel} (beyond the first between two poses)")
-    most = node_name(int(graph.ids[degrees.argmax()]))
+    most = graph.label(int(degrees.argmax()))
     fixed = [int(graph.ids[index]) for index in graph.fixed]
     yield Fact("fixed", fixed, "fixed in the file", ", ".join(map(node_name, fixed)) or "none")
     yield Fact("mean_degree", float(degrees.mean()), "mean degree", f"{degrees.mean():.2f}")
@@ -141,7 +141,7 @@ def _components(graph: PoseGraph) -> Iterator[Fact]:
         rows.append(row | {"chi2_per_dof_filed": part.chi2 / freedom if freedom else None})
     yield Fact("components", rows, "", "")
     for part, row in zip(parts[:_MOST_COMPONENTS], rows, strict=False):
-        first, last = node_name(int(part.ids[0])), node_name(int(part.ids[-1]))
+        first, last = part.label(0), part.label(-1)
         label = f"pose {first}" if part.num_poses == 1 else f"{part.num_poses} poses, {first} … {last}"
         ratio = row["chi2_per_dof_filed"]
         fit = "a tree" if ratio is None else f"χ² per degree of freedom {ratio:.4g} as filed"

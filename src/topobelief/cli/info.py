@@ -10,7 +10,7 @@ import typer
 from topobelief.cli import plan_arguments as values
 from topobelief.cli import plan_options as options
 from topobelief.cli.plan_arguments import GivenPlace
-from topobelief.cli.reading import Component, Drop, Edge2OrderOption, Planar, RobustAsPlain, reading_options
+from topobelief.cli.reading import Component, Drop, Edge2OrderOption, Planar, RobustAsPlain, Topic, reading_options
 
 _PLACES = "Goals and picture"
 
@@ -30,9 +30,15 @@ MapFile = Annotated[
     typer.Option(
         "--map",
         metavar="FILE",
-        help="ROS map (.yaml) or walls (.csv), for goals and picture.",
+        help="ROS map (.yaml), walls (.csv) or a bag, for goals and picture.",
         show_default="what lies along the trajectory",
         rich_help_panel=_PLACES,
+    ),
+]
+MapTopic = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME", help="Of a bag, the topic that holds the map.", show_default="the only one", rich_help_panel=_PLACES
     ),
 ]
 RobotRadius = Annotated[float, typer.Option(metavar="M", help="Metres.", callback=values.above_zero, rich_help_panel=_PLACES)]
@@ -55,6 +61,7 @@ def info(
     ] = True,
     goal: Goals = None,
     map_file: MapFile = None,
+    map_topic: MapTopic = None,
     robot_radius: RobotRadius = 0.35,
     picture: Picture = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")] = False,
@@ -63,6 +70,7 @@ def info(
     edge2_order: Edge2OrderOption = "toro",
     component: Component = "all",
     planar: Planar = False,
+    topic: Topic = None,
 ) -> None:
     """Describe a pose graph: size, fit, spanning trees, signatures, entropy and its bounds."""
     from topobelief.cli.console import Reporter
@@ -72,7 +80,7 @@ def info(
         from topobelief.cli import graph_facts, graph_picture
     graph_picture.check_picture_file(picture)
     reading = reading_options(
-        drop, robust_as_plain=robust_as_plain, edge2_order=edge2_order, component=component, planar=planar
+        drop, robust_as_plain=robust_as_plain, edge2_order=edge2_order, component=component, planar=planar, topic=topic
     )
     facts = graph_facts.describe(graph_file, reporter, optimized=optimize, reading=reading)
     world = None
@@ -81,7 +89,7 @@ def info(
         from topobelief.cli.plan_ends import choose_goals
         from topobelief.cli.plan_world import read_world
 
-        world = read_world(map_file, facts.graph, reporter)
+        world = read_world(map_file, facts.graph, reporter, topic=map_topic)
         goals = choose_goals(facts.graph, goal or ())
         if goals:
             facts.groups["Goals"] = list(describe_goals(facts.graph, world, goals, robot_radius))

@@ -11,7 +11,7 @@ import typer
 
 from topobelief.cli import plan_mode
 from topobelief.cli import plan_options as options
-from topobelief.cli.reading import Component, Drop, Edge2OrderOption, Planar, RobustAsPlain, reading_options
+from topobelief.cli.reading import Component, Drop, Edge2OrderOption, Planar, RobustAsPlain, Topic, reading_options
 from topobelief.errors import NotOptimizedWarning
 
 
@@ -21,6 +21,7 @@ def plan(
     goal: options.Goals = None,
     start: options.Start = None,
     map_file: options.MapFile = None,
+    map_topic: options.MapTopic = None,
     along_trajectory: options.AlongTrajectory = False,
     width: options.Width = None,
     unknown: options.UnknownCells = "occupied",
@@ -64,6 +65,7 @@ def plan(
     edge2_order: Edge2OrderOption = "toro",
     component: Component = "all",
     planar: Planar = False,
+    topic: Topic = None,
 ) -> None:
     """Choose the best way to a goal on a pose-graph map, or the best trip to improve the map.
 
@@ -121,10 +123,10 @@ def plan(
         information=plan_stages.information(sigma_p, sigma_theta),
     )
     reading = reading_options(
-        drop, robust_as_plain=robust_as_plain, edge2_order=edge2_order, component=component, planar=planar
+        drop, robust_as_plain=robust_as_plain, edge2_order=edge2_order, component=component, planar=planar, topic=topic
     )
     graph = plan_stages.read_graph(graph_file, reporter, optimized=optimize, reading=reading)
-    world = plan_world.read_world(map_file, graph, reporter, width=width, unknown=unknown)
+    world = plan_world.read_world(map_file, graph, reporter, width=width, unknown=unknown, topic=map_topic)
     begin = plan_ends.choose_start(graph, world, reporter, start)
     goals = plan_ends.choose_goals(graph, goal or ())
     model = told_closures(rule.closures, graph, world, reporter, line_of_sight=rule.line_of_sight)

@@ -53,7 +53,16 @@ Optimize = Annotated[
 ]
 
 MapFile = Annotated[
-    Path | None, typer.Option("--map", metavar="FILE", help="ROS map (.yaml) or walls (.csv).", rich_help_panel=_WORLD)
+    Path | None, typer.Option("--map", metavar="FILE", help="ROS map (.yaml), walls (.csv), or a bag.", rich_help_panel=_WORLD)
+]
+MapTopic = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME",
+        help="Of a bag, the topic that holds the map.",
+        show_default="the only one",
+        rich_help_panel=_WORLD,
+    ),
 ]
 AlongTrajectory = Annotated[
     bool,

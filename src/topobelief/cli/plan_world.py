@@ -26,11 +26,12 @@ def read_world(
     *,
     width: float | None = None,
     unknown: Unknown = "occupied",
+    topic: str | None = None,
 ) -> World:
     """The floor plan, or what lies along the trajectory where there is none."""
     with reporter.stage("world"):
         if map_file is not None:
-            world, source = floor_plan.read_world(map_file, unknown=unknown), str(map_file)
+            world, source = floor_plan.read_world(map_file, unknown=unknown, topic=topic), str(map_file)
         else:
             width = default_width(graph) if width is None else width
             world, source = World.from_trajectory(graph, width), f"within {width:.2f} m of the trajectory"

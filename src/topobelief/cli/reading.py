@@ -52,10 +52,25 @@ Planar = Annotated[
     bool,
     typer.Option("--planar", metavar="", help="Project a graph in 3D onto the plane.", rich_help_panel=_READING),
 ]
+Topic = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME",
+        help="Of a bag, the topic that holds the graph; may be repeated for markers that draw it together.",
+        show_default="the only one",
+        rich_help_panel=_READING,
+    ),
+]
 
 
 def reading_options(
-    drop: list[str] | None, *, robust_as_plain: bool, edge2_order: Edge2Order, component: str, planar: bool
+    drop: list[str] | None,
+    *,
+    robust_as_plain: bool,
+    edge2_order: Edge2Order,
+    component: str,
+    planar: bool,
+    topic: list[str] | None,
 ) -> ReadingOptions:
     """What these options ask the readers for."""
     from topobelief.io.reading import Droppable, ReadingOptions
@@ -66,4 +81,5 @@ def reading_options(
         edge2_order=edge2_order,
         component=component,
         planar=planar,
+        topic=topic or (),
     )

@@ -18,6 +18,7 @@ from topobelief.geometry import SE2_GROUP, group_of_size
 from topobelief.graph.action import Action, posterior
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.optional import load
+from topobelief.symbols import id_of_key, key_of_id
 from topobelief.wording import counted
 
 _LEAST_WEIGHT = 1e-6  # of a robust factor, below which it is an outlier that counts no more
@@ -32,18 +33,12 @@ def to_gtsam(graph: PoseGraph) -> tuple[Any, Any]:
     Parameters
     ----------
     graph
-        With ids that are not negative.
 
     Returns
     -------
     factors : gtsam.NonlinearFactorGraph
         One BetweenFactorPose2 or BetweenFactorPose3 per edge, in the order of the edges.
     values : gtsam.Values
-
-    Raises
-    ------
-    InvalidInputError
-        If an id is negative, which no GTSAM key can be.
     """
     return _factors_and_values(graph, first_pose=0, first_edge=0)
 
@@ -57,7 +52,6 @@ def action_to_gtsam(graph: PoseGraph, action: Action) -> tuple[Any, Any]:
     Parameters
     ----------
     graph
-        With ids that are not negative.
     action
         Its measurements are those that its poses predict.
 
@@ -70,8 +64,6 @@ def action_to_gtsam(graph: PoseGraph, action: Action) -> tuple[Any, Any]:
 
     Raises
     ------
-    InvalidInputError
-        If an id is negative, which no GTSAM key can be.
     InvalidActionError
         If the action does not fit the graph.
     """
@@ -81,23 +73,25 @@ def action_to_gtsam(graph: PoseGraph, action: Action) -> tuple[Any, Any]:
 def _factors_and_values(graph: PoseGraph, *, first_pose: int, first_edge: int) -> tuple[Any, Any]:
     """Factors and values of the poses and edges from these on."""
     gtsam = load_gtsam()
-    if (graph.ids < 0).any():
-        raise InvalidInputError(f"expected ids from 0 as GTSAM keys, got {graph.ids.min()}")
     planar = graph.group is SE2_GROUP
     between = gtsam.BetweenFactorPose2 if planar else gtsam.BetweenFactorPose3
     order = np.arange(3) if planar else _ROTATION_FIRST
     information = np.ascontiguousarray(graph.information[first_edge:, order][:, :, order])
     factors, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
-    for key, pose in zip(graph.ids[first_pose:].tolist(), graph.poses[first_pose:].tolist(), strict=True):
+    keys = [key_of_id(node) for node in graph.ids.tolist()]
+    for key, pose in zip(keys[first_pose:], graph.poses[first_pose:].tolist(), strict=True):
         values.insert(key, _to_pose(gtsam, pose))
-    ends, measurements = graph.ids[graph.edges[first_edge:]].tolist(), graph.measurements[first_edge:].tolist()
-    for (i, j), measured, matrix in zip(ends, measurements, information, strict=True):
-        factors.add(between(i, j, _to_pose(gtsam, measured), gtsam.noiseModel.Gaussian.Information(matrix)))
+    edges, measurements = graph.edges[first_edge:].tolist(), graph.measurements[first_edge:].tolist()
+    for (i, j), measured, matrix in zip(edges, measurements, information, strict=True):
+        factors.add(between(keys[i], keys[j], _to_pose(gtsam, measured), gtsam.noiseModel.Gaussian.Information(matrix)))
     return factors, values
 
 
 def from_gtsam(factors: Any, values: Any = None) -> PoseGraph:
     """A pose graph from GTSAM's between factors and values; ids are the keys, and symbols are shown as such.
+
+    Poses are in the order of their keys: `graph.index("x3")` finds one, `graph.label(index)` says how it is called. A key from
+    2^63 on is the negative id of the same 64 bits, of which `to_gtsam` makes the key again.
 
     Parameters
     ----------
@@ -107,13 +101,13 @@ def from_gtsam(factors: Any, values: Any = None) -> PoseGraph:
         on one pose is allowed and left out: it only says where the graph lies, on which no quantity depends. Slots of removed
         factors are skipped. An ISAM2 stands for its factors and its estimate.
     values : gtsam.Values, optional
-        A pose for every key of the factors; keys are below 2^63. Only an ISAM2 needs none.
+        A pose for every key of the factors; keys may be any. Only an ISAM2 needs none.
 
     Raises
     ------
     InvalidInputError
         If the arguments are of other types or swapped; if a factor is of another kind, has constrained noise, or is a second
-        prior; if a pose is missing, or a key too large for an id. Names the factor or the key.
+        prior; if a pose is missing. Names the factor or the key.
     InvalidGraphError
         If the graph itself is malformed, for example a self-loop.
     """
@@ -122,8 +116,6 @@ def from_gtsam(factors: Any, values: Any = None) -> PoseGraph:
         factors, values = factors.getFactorsUnsafe(), factors.calculateEstimate()
     _require_factors_and_values(gtsam, factors, values)
     keys: list[int] = sorted(values.keys())
-    if keys and keys[-1] >= 2**63:
-        raise InvalidInputError(f"expected keys below 2^63, got {keys[-1]}; use a symbol with an ASCII character")
     index_of = {key: index for index, key in enumerate(keys)}
     poses = [_value(gtsam, values, key) for key in keys]
     edges: list[tuple[int, int]] = []
@@ -168,7 +160,7 @@ def from_gtsam(factors: Any, values: Any = None) -> PoseGraph:
         np.array(edges, dtype=np.int64),
         np.array(measurements).reshape(-1, len(poses[0])),
         np.array(information) if information else identity,
-        ids=np.array(keys, dtype=np.int64),
+        ids=np.array([id_of_key(key) for key in keys], dtype=np.int64),
     )
 
 

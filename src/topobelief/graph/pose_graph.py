@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from topobelief.arrays import FloatArray, IntArray, ReadOnlyArrays, frozen_floats, frozen_ints, read_only
-from topobelief.errors import InvalidGraphError
+from topobelief.errors import InvalidGraphError, InvalidInputError
 from topobelief.geometry import Group, group_of_size
 from topobelief.graph.information import checked_information
 from topobelief.graph.topology import Topology
+from topobelief.symbols import find_node, node_name
 from topobelief.wording import counted
 
 _LARGEST_ID_JUMP = 100  # times the usual step of ids: what lies further on is a tag, a landmark or another robot
@@ -188,9 +189,44 @@ class PoseGraph(ReadOnlyArrays):
         residuals = self.group.residual(self.measurements, predicted)
         return float(np.einsum("ea,eab,eb->", residuals, self.information, residuals))
 
+    def label(self, index: int) -> str:
+        """What a person calls the pose of this index: x3 for a symbol of GTSAM, else its id.
+
+        Examples
+        --------
+        >>> graph = PoseGraph([[0, 0, 0], [1, 0, 0]], [(0, 1)], None, np.eye(3), ids=[(ord("x") << 56) + 3, 7])
+        >>> graph.label(0), graph.label(1), graph.index("x3"), graph.index(7)
+        ('x3', '7', 0, 1)
+        """
+        return node_name(int(self.ids[index]))
+
+    def index(self, label: int | str) -> int:
+        """Index of the pose with this id or label.
+
+        Raises
+        ------
+        InvalidInputError
+            If there is none.
+        """
+        found = find_node(self.ids.tolist(), label)
+        if found is None:
+            raise InvalidInputError(
+                f"expected the id or label of a pose, as {self.label(0)} or {self.label(-1)}, got {label!r}"
+            )
+        return found
+
     def with_poses(self, poses: ArrayLike) -> PoseGraph:
         """The same measurements at other poses."""
         return PoseGraph(poses, self.edges, self.measurements, self.information, ids=self.ids, fixed=self.fixed)
+
+
+def require_pose_graph(graph: object) -> None:
+    """Raise `InvalidInputError` for what is no pose graph; of objects of GTSAM, say what makes one of them."""
+    if not isinstance(graph, PoseGraph):
+        advice = (
+            "; from_gtsam makes one of factors and values, or of an ISAM2" if type(graph).__module__.startswith("gtsam") else ""
+        )
+        raise InvalidInputError(f"expected a PoseGraph, got {type(graph).__name__}{advice}")
 
 
 def checked_pose_rows(

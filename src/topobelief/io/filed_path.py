@@ -48,14 +48,23 @@ def unit_quaternions(path: StrPath, quaternions: FloatArray, lines: Sequence[int
     FileError
         Names the line of a quaternion whose length is not 1.
     """
-    with np.errstate(over="ignore"):
+    unit, bad, problem = normalised(quaternions)
+    if bad is not None:
+        raise FileError(path, problem, line=lines[bad])
+    return unit
+
+
+def normalised(quaternions: FloatArray) -> tuple[FloatArray, int | None, str]:
+    """Quaternions of shape (N, 4), normalised; the index of the first that is none, and what is wrong with it."""
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         lengths = np.linalg.norm(quaternions, axis=1)
+        unit = quaternions / lengths[:, None]
     bad = np.flatnonzero(~(np.abs(lengths - 1) <= _UNIT_TOLERANCE))
-    if bad.size:
-        first, length = int(bad[0]), float(lengths[bad[0]])
-        advice = "; give 0 0 0 1 where the heading does not matter" if length == 0 else ""
-        raise FileError(path, f"expected a quaternion of length 1, got one of {length:.4g}{advice}", line=lines[first])
-    return quaternions / lengths[:, None]
+    if not bad.size:
+        return unit, None, ""
+    first, length = int(bad[0]), float(lengths[bad[0]])
+    advice = "; give 0 0 0 1 where the heading does not matter" if length == 0 else ""
+    return unit, first, f"expected a quaternion of length 1, got one of {length:.4g}{advice}"
 
 
 def numbered_lines(text: str) -> Iterator[tuple[int, str]]:

@@ -13,6 +13,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from topobelief.errors import FileError, InvalidMapError
+from topobelief.io.bag_maps import read_bag_map
+from topobelief.io.bags import is_bag
 from topobelief.io.files import StrPath, read_text
 from topobelief.io.ros_map import Unknown, read_ros_map
 from topobelief.world import World
@@ -22,20 +24,24 @@ _BOUNDS = re.compile(r"#\s*bounds\s*:(.*)")
 _EXPECTED = "four finite numbers x_min, y_min, x_max, y_max with min < max"
 
 
-def read_world(path: StrPath, *, unknown: Unknown = "occupied") -> World:
-    """A world by the suffix of its file: .yaml or .yml a ROS map, .csv walls.
+def read_world(path: StrPath, *, unknown: Unknown = "occupied", topic: str | None = None) -> World:
+    """A world by the suffix of its file: .yaml or .yml a ROS map, .csv walls; or the last occupancy grid in a bag.
 
     Parameters
     ----------
     path
     unknown
-        What the unknown cells of a ROS map are taken for.
+        What the unknown cells of a ROS map or of an occupancy grid are taken for.
+    topic
+        Of a bag, where more than one topic has occupancy grids.
 
     Raises
     ------
     FileError
         For any other suffix, and where the file is not what it should be.
     """
+    if is_bag(path):
+        return read_bag_map(path, unknown=unknown, topic=topic)
     suffix = Path(path).suffix.lower()
     if suffix in (".yaml", ".yml"):
         return read_ros_map(path, unknown=unknown)
@@ -43,7 +49,7 @@ def read_world(path: StrPath, *, unknown: Unknown = "occupied") -> World:
         return read_walls(path)
     hint = "; name the YAML file that belongs to the image" if suffix in (".pgm", ".png", ".bmp", ".jpg", ".tif") else ""
     raise FileError(
-        path, f"expected a map that ends in .yaml, .yml (ROS map) or .csv (walls), got {suffix or 'no suffix'}{hint}"
+        path, f"expected a map that ends in .yaml, .yml (ROS map) or .csv (walls), or a bag, got {suffix or 'no suffix'}{hint}"
     )
 
 

@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import Unpack
 
 from topobelief.graph.pose_graph import PoseGraph
+from topobelief.io.bag_graphs import read_bag
+from topobelief.io.bags import is_bag
 from topobelief.io.boost_archive import is_boost_archive, refuse_boost_archive
 from topobelief.io.files import StrPath, read_head
 from topobelief.io.g2o import G2O
@@ -29,13 +31,13 @@ def read_pose_graph(path: StrPath, **options: Unpack[ReadingKeywords]) -> PoseGr
     """Read a pose graph in whatever format its content shows; the name of the file does not matter.
 
     Formats: g2o; TORO, also as iSAM writes it; databases of RTAB-Map; trajectories in TUM or KITTI format, for which `noise`
-    has to be stated; and the graph that slam_toolbox or Cartographer draws, a visualization_msgs/MarkerArray as
-    `ros2 topic echo` prints it.
+    has to be stated; the graph that slam_toolbox or Cartographer draws, a visualization_msgs/MarkerArray as
+    `ros2 topic echo` prints it; and bags of ROS 1 and 2 (`topic` says what of them; needs the extra `ros`).
 
     Parameters
     ----------
     path
-        The file. Metres and radians.
+        The file, or the folder of a bag. Metres and radians.
     **options
         What to drop or assume instead of refusing the file: see `topobelief.ReadingOptions`. What an option changed is
         issued as a `ReadingWarning`.
@@ -52,6 +54,8 @@ def read_pose_graph(path: StrPath, **options: Unpack[ReadingKeywords]) -> PoseGr
 
 def read_graph_file(path: StrPath, options: ReadingOptions) -> ReadGraph:
     """As `read_pose_graph`, with what was dropped or assumed as notes in place of warnings."""
+    if is_bag(path):
+        return read_bag(path, options)
     head = (
         read_head(path) if Path(path).is_file() else b""
     )  # what comes through a pipe can be read once, and is taken for lines

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -36,10 +37,10 @@ _HEAD = re.compile(rb"\s*(---\s*)*markers:\s*(\[\])?\s*$", re.MULTILINE)
 
 
 @dataclass
-class _Marker:
-    """What matters of one marker."""
+class Marker:
+    """What matters of one marker; its line, if it stands in a text."""
 
-    line: int
+    line: int | None = None
     namespace: str = ""
     number: int = 0
     kind: int = 0
@@ -65,7 +66,14 @@ def read_markers(path: StrPath, options: ReadingOptions) -> ReadGraph:
     FileError
         If the file is no such message, or its markers show no edges between poses.
     """
-    markers = [marker for marker in _markers(path) if marker.action == 0]
+    return graph_of_markers(path, _markers(path), options)
+
+
+def graph_of_markers(path: StrPath, markers: Iterable[Marker], options: ReadingOptions, notes: Sequence[str] = ()) -> ReadGraph:
+    """As `read_markers`, of the markers themselves, with what is to be said of where they come from."""
+    markers = [
+        marker for marker in {(marker.namespace, marker.number): marker for marker in markers}.values() if marker.action == 0
+    ]
     bodies = sorted((marker for marker in markers if marker.kind in _BODIES), key=lambda marker: marker.number)
     strips = [marker for marker in markers if marker.kind == _STRIP and marker.points]
     lists = [marker for marker in markers if marker.kind == _LIST and marker.points]
@@ -94,17 +102,17 @@ def read_markers(path: StrPath, options: ReadingOptions) -> ReadGraph:
         graph = _graph(positions[nodes], index[edges], _ids(len(others), len(poses), len(drawn), bodies), options)
     except InvalidGraphError as error:
         raise FileError(path, str(error)) from None
-    return wanted_part(path, graph, options, [_note(options)])
+    return wanted_part(path, graph, options, [*notes, _note(options)])
 
 
-def _require_edges(path: StrPath, markers: list[_Marker], edges: FloatArray | IntArray) -> None:
+def _require_edges(path: StrPath, markers: list[Marker], edges: FloatArray | IntArray) -> None:
     """Refuse a drawing in which no line joins two poses."""
     if len(edges) == 0:
         found = f"{counted(len(markers), 'marker')} without any"
         raise FileError(path, f"expected lines between poses among the markers, got {found}; record the topic that shows edges")
 
 
-def _ids(num_others: int, num_poses: int, num_drawn: int, bodies: list[_Marker]) -> IntArray:
+def _ids(num_others: int, num_poses: int, num_drawn: int, bodies: list[Marker]) -> IntArray:
     """The numbers of bodies, where each pose is one; else counts, with a gap after what is no pose of the trajectory."""
     numbers = np.unique([marker.number for marker in bodies])
     if num_others == 0 and len(numbers) == len(bodies) == num_drawn == num_poses and numbers[0] >= 0:
@@ -143,7 +151,7 @@ def _pairs(points: list[list[list[float]]]) -> FloatArray:
     return np.array(points).reshape(-1, 2, 3)
 
 
-def _of_lists(path: StrPath, lists: list[_Marker]) -> tuple[FloatArray, FloatArray]:
+def _of_lists(path: StrPath, lists: list[Marker]) -> tuple[FloatArray, FloatArray]:
     """Lines of Cartographer's residuals, from where a constraint ends to the pose that it is about, and all other lines."""
     found: tuple[list[FloatArray], list[FloatArray]] = ([_NO_PAIRS], [_NO_PAIRS])
     for marker in lists:
@@ -175,7 +183,7 @@ def _distinct(pairs: IntArray) -> IntArray:
     return edges[np.sort(first)]
 
 
-def _require_own_frame(path: StrPath, marker: _Marker) -> None:
+def _require_own_frame(path: StrPath, marker: Marker) -> None:
     """Refuse lines that are drawn in a frame of their own; a height is how far Cartographer lifts some to show them."""
     moved = [name for name, value in marker.pose.items() if value != 0 and name not in ("position.z", "orientation.w")]
     if moved:
@@ -184,24 +192,21 @@ def _require_own_frame(path: StrPath, marker: _Marker) -> None:
         )
 
 
-def _markers(path: StrPath) -> list[_Marker]:
-    """The markers of all messages, each at its last state."""
-    found: dict[tuple[str, int], _Marker] = {}
-    marker, begun = _Marker(1), 0
+def _markers(path: StrPath) -> list[Marker]:
+    """The markers of all messages, in their order."""
+    found: list[Marker] = []
+    begun = 0
     for value in echoed_values(path):
         if value.names[:2] != ("markers", "-"):
             continue
         if value.item != begun:
-            if begun:
-                found[marker.namespace, marker.number] = marker
-            marker, begun = _Marker(value.line), value.item
-        _take(path, marker, value)
-    if begun:
-        found[marker.namespace, marker.number] = marker
-    return list(found.values())
+            found.append(Marker(value.line))
+            begun = value.item
+        _take(path, found[-1], value)
+    return found
 
 
-def _take(path: StrPath, marker: _Marker, value: EchoedValue) -> None:
+def _take(path: StrPath, marker: Marker, value: EchoedValue) -> None:
     """Put one value where it belongs."""
     match value.names[2:]:
         case ("ns",):

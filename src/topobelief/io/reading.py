@@ -31,6 +31,7 @@ class ReadingKeywords(TypedDict, total=False):
     noise: tuple[float, float] | None
     spacing: float
     closure_radius: float | None
+    topic: str | Collection[str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +62,9 @@ class ReadingOptions:
     closure_radius
         Join each kept pose of a trajectory to the nearest earlier one within so many metres that the robot has left by
         three times that since. None: a trajectory is odometry alone.
+    topic
+        Of a bag, the name of the topic to read, or several of markers that draw one graph together, as Cartographer's two.
+        None named: the only one that can be read.
 
     Raises
     ------
@@ -77,6 +81,7 @@ class ReadingOptions:
     noise: tuple[float, float] | None = None
     spacing: float = 0.0
     closure_radius: float | None = None
+    topic: str | Collection[str] = ()
 
     def __repr__(self) -> str:
         """Only what differs from the defaults; words to drop in alphabetical order."""
@@ -108,6 +113,7 @@ class ReadingOptions:
                     f"got {self.spacing:g} m; every pose that is kept beside a former place makes a closure"
                 )
         object.__setattr__(self, "drop", frozenset(words))
+        object.__setattr__(self, "topic", (self.topic,) if isinstance(self.topic, str) else tuple(self.topic))
 
 
 class ReadGraph(NamedTuple):

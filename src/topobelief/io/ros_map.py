@@ -39,9 +39,9 @@ _DAMAGE = (ArithmeticError, EOFError, LookupError, NotImplementedError, SyntaxEr
 """What Pillow's decoders raise on damaged images, besides OSError."""
 
 _MAX_PIXELS = 150_000_000  # some 1.2 GB and 8 s
-_SMALLEST_RESOLUTION, _LARGEST_RESOLUTION = 1e-6, 1e6  # metres a pixel
+SMALLEST_RESOLUTION, LARGEST_RESOLUTION = 1e-6, 1e6  # metres a pixel
 _COARSE = 2.0  # metres a pixel, above which millimetres are more likely
-_MAX_CELLS_AWAY = 1e9  # from the origin of the world, at which coordinates still resolve a millionth of a cell
+MAX_CELLS_AWAY = 1e9  # from the origin of the world, at which coordinates still resolve a millionth of a cell
 
 
 def read_ros_map(path: StrPath, *, unknown: Unknown = "occupied") -> World:
@@ -156,8 +156,8 @@ def _read_header(path: StrPath) -> _Header:
 
     resolution, free_thresh, occupied_thresh = map(required, ("resolution", "free_thresh", "occupied_thresh"))
     metres = resolution.number(above=0)
-    if not _SMALLEST_RESOLUTION <= metres <= _LARGEST_RESOLUTION:
-        resolution.refuse(f"{_SMALLEST_RESOLUTION:g} to {_LARGEST_RESOLUTION:g} metres a pixel")
+    if not SMALLEST_RESOLUTION <= metres <= LARGEST_RESOLUTION:
+        resolution.refuse(f"{SMALLEST_RESOLUTION:g} to {LARGEST_RESOLUTION:g} metres a pixel")
     free_below, occupied_above = (threshold.number(at_least=0, at_most=1) for threshold in (free_thresh, occupied_thresh))
     if free_below > occupied_above:
         free_thresh.refuse(f"a threshold of at most occupied_thresh, which is {occupied_above:g}")
@@ -177,8 +177,8 @@ def _read_header(path: StrPath) -> _Header:
 
 def _origin(field: Field, resolution: float) -> tuple[float, float, float]:
     x, y, yaw = field.numbers(3, expected="[x, y, yaw]")
-    if max(abs(x), abs(y)) > _MAX_CELLS_AWAY * resolution:
-        field.refuse(f"an origin within {_MAX_CELLS_AWAY:g} cells of (0, 0)", f"({x:g}, {y:g}) with cells of {resolution:g} m")
+    if max(abs(x), abs(y)) > MAX_CELLS_AWAY * resolution:
+        field.refuse(f"an origin within {MAX_CELLS_AWAY:g} cells of (0, 0)", f"({x:g}, {y:g}) with cells of {resolution:g} m")
     if abs(yaw) > 2 * math.pi:
         field.refuse("a yaw in radians, from -2 pi to 2 pi", f"{yaw:g}; if it is in degrees, write {math.radians(yaw):.7g}")
     return x, y, yaw

@@ -53,25 +53,53 @@ def read_trajectory(path: StrPath, options: ReadingOptions) -> ReadGraph:
     FileError
         If no noise is stated, or a line is not a pose; names the line.
     """
+    _require_noise(path, options)
+    poses, notes = _poses(path)
+    return graph_along(path, poses, options, notes)
+
+
+def graph_along(path: StrPath, poses: FloatArray, options: ReadingOptions, notes: list[str]) -> ReadGraph:
+    """The graph in SE(3) of a trajectory: odometry and closures by the rule of the options.
+
+    Parameters
+    ----------
+    path
+        What it was read from.
+    poses : shape (N, 7)
+    options
+        Noise, spacing and the rule of closures.
+    notes
+        What was assumed so far.
+
+    Raises
+    ------
+    FileError
+        If no noise is stated.
+    """
+    noise = _require_noise(path, options)
+    kept = _spaced(poses[:, :3], options.spacing)
+    poses = poses[kept]
+    odometry = np.column_stack([np.arange(len(poses) - 1), np.arange(1, len(poses))])
+    closures = _closures(poses[:, :3], options.closure_radius)
+    information = block_isotropic(*noise, tangent_dim=SE3_GROUP.tangent_dim)
+    graph = PoseGraph(poses, np.concatenate([odometry, closures]), None, information, ids=kept)
+    notes = [
+        *notes,
+        f"took {len(poses)} of {kept[-1] + 1} poses of a trajectory for a graph with {counted(len(odometry), 'odometry edge')} "
+        f"and {counted(len(closures), 'closure')} by rule; each measured what its poses say, with standard deviations of "
+        f"{noise[0]:g} m and {math.degrees(noise[1]):g} degrees",
+    ]
+    return wanted_part(path, graph, options, notes)
+
+
+def _require_noise(path: StrPath, options: ReadingOptions) -> tuple[float, float]:
     if options.noise is None:
         raise FileError(
             path,
             "expected a noise for the odometry of a trajectory, which states none, got none; give standard deviations a step "
             "with noise=(metres, radians) in Python, or make a graph with `topobelief convert FILE graph.g2o --noise M DEG`",
         )
-    poses, notes = _poses(path)
-    kept = _spaced(poses[:, :3], options.spacing)
-    poses = poses[kept]
-    odometry = np.column_stack([np.arange(len(poses) - 1), np.arange(1, len(poses))])
-    closures = _closures(poses[:, :3], options.closure_radius)
-    information = block_isotropic(*options.noise, tangent_dim=SE3_GROUP.tangent_dim)
-    graph = PoseGraph(poses, np.concatenate([odometry, closures]), None, information, ids=kept)
-    notes.append(
-        f"took {len(poses)} of {kept[-1] + 1} poses of a trajectory for a graph with {counted(len(odometry), 'odometry edge')} "
-        f"and {counted(len(closures), 'closure')} by rule; each measured what its poses say, with standard deviations of "
-        f"{options.noise[0]:g} m and {math.degrees(options.noise[1]):g} degrees"
-    )
-    return wanted_part(path, graph, options, notes)
+    return options.noise
 
 
 def _poses(path: StrPath) -> tuple[FloatArray, list[str]]:

@@ -26,7 +26,7 @@ from topobelief.graph.action import Action, check_actions
 from topobelief.graph.alignment import DEFAULT_SAMPLE_SIZE, checked_sample_size
 from topobelief.graph.fit import warn_of_misfit
 from topobelief.graph.information import SAME_NOISE, shared_information
-from topobelief.graph.pose_graph import PoseGraph
+from topobelief.graph.pose_graph import PoseGraph, require_pose_graph
 from topobelief.graph.topology import checked_anchor
 from topobelief.optional import has_kernels, missing_packages
 from topobelief.planning.batch import Batch, Criteria
@@ -127,6 +127,7 @@ class Planner:
     ) -> None:
         require_choice("objective", objective, ALL_OBJECTIVES)
         require_choice("signature", signature, SIGNATURES)
+        require_pose_graph(graph)
         require_choice("engine", engine, (*ENGINES, AUTO))
         if engine == "incremental" and not has_kernels():
             raise missing_packages(["numba"], ["fast"])

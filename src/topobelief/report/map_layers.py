@@ -249,7 +249,7 @@ def draw_candidates(panel: Panel, paths: Sequence[FloatArray], decision: Decisio
 
 def draw_ends(panel: Panel, graph: PoseGraph, start: Start, goals: FloatArray) -> list[Entry]:
     """Start and goals, shape (G, 2)."""
-    at_pose = "the graph's last pose" if start.pose == graph.num_poses - 1 else f"pose {graph.ids[start.pose]}"
+    at_pose = "the graph's last pose" if start.pose == graph.num_poses - 1 else f"pose {graph.label(start.pose)}"
     name = f"start, {f'near {at_pose}' if start.distance(graph) else at_pose}"
     key: list[Entry] = []
     for label, place, marker, colour, size in (
