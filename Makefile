@@ -6,7 +6,7 @@ PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3; do command 
 BIN := .venv/bin
 STAMP := .venv/.installed
 
-.PHONY: install demo test check bench clean
+.PHONY: install demo test test-ros check bench clean
 
 install: $(STAMP)
 
@@ -39,4 +39,15 @@ bench: install
 	$(BIN)/python -m pytest -o addopts= -q benchmarks/kernels.py --benchmark-columns=min,median,max --benchmark-sort=name
 
 clean:
-	rm -rf .venv out dist build
+	rm -rf .venv .venv-ros out dist build
+
+# The node across processes, with ROS 2 as wheels in an environment of their own; Python 3.11, for which they are made.
+ROS := .venv-ros/bin
+$(ROS)/.installed: pyproject.toml constraints-ros.txt
+	test -x $(ROS)/python || python3.11 -m venv .venv-ros
+	$(ROS)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -r constraints-ros.txt -e '.[fast]' pytest
+	touch $@
+
+test-ros: install
+	@if command -v python3.11 >/dev/null 2>&1; then $(MAKE) --no-print-directory $(ROS)/.installed && \
+	  $(ROS)/python -m pytest -W ignore::DeprecationWarning tests/ros; else echo "not run: the wheels of ROS 2 need Python 3.11"; fi

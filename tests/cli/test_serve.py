@@ -18,7 +18,7 @@ from topobelief.page import situation
 from topobelief.page.server import PageServer
 
 pytest.importorskip("numba")
-from topobelief.cli.page_answers import Answers
+from topobelief.cli.answers import Answers
 
 PLACE_OF_GOAL = """(() => {
     const box = document.getElementById('map').getBoundingClientRect(), [u, v] = onScreen([0, 5]);

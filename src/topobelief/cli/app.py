@@ -16,6 +16,7 @@ from topobelief.cli.datasets import datasets
 from topobelief.cli.info import info
 from topobelief.cli.plan import plan
 from topobelief.cli.reproduce import reproduce
+from topobelief.cli.ros import ros
 from topobelief.cli.serve import serve
 from topobelief.cli.simulate import simulate, simulate_compare
 from topobelief.cli.study import study, study_report
@@ -30,6 +31,7 @@ _UsageError = cast("type[Exception]", typer.BadParameter.__mro__[1])
 app = typer.Typer(name="topobelief", pretty_exceptions_enable=False)
 app.command(cls=PlaceCommand)(plan)
 app.command(cls=PlaceCommand)(serve)
+app.command(cls=Command, context_settings={"allow_extra_args": True, "ignore_unknown_options": True})(ros)
 app.command(cls=PlaceCommand)(info)
 app.command(cls=Command)(convert)
 app.command(cls=Command)(datasets)

@@ -9,7 +9,7 @@ import typer
 
 from topobelief.cli import plan_options as options
 from topobelief.cli.extras import require_extras
-from topobelief.cli.reading import Component, Drop, Edge2OrderOption, Planar, RobustAsPlain, reading_options
+from topobelief.cli.reading import Component, Drop, Edge2OrderOption, Planar, RobustAsPlain, Topic, reading_options
 
 _SERVER = "The server"
 _TRIP = 30.0  # metres; of a trip without a goal unless another length is asked for
@@ -35,6 +35,7 @@ def serve(
     graph_file: options.GraphFile,
     start: options.Start = None,
     map_file: options.MapFile = None,
+    map_topic: options.MapTopic = None,
     along_trajectory: options.AlongTrajectory = False,
     width: options.Width = None,
     unknown: options.UnknownCells = "occupied",
@@ -52,6 +53,7 @@ def serve(
     edge2_order: Edge2OrderOption = "toro",
     component: Component = "all",
     planar: Planar = False,
+    topic: Topic = None,
 ) -> None:
     """Plan on a page: click a goal, see the best ways, what they see again, and why others are worse.
 
@@ -62,8 +64,8 @@ def serve(
     require_extras("fast")
     from topobelief.candidates.propose import CandidateRule
     from topobelief.cli import plan_ends, plan_stages, plan_world
+    from topobelief.cli.answers import Answers
     from topobelief.cli.console import Reporter
-    from topobelief.cli.page_answers import Answers
     from topobelief.errors import InvalidInputError
     from topobelief.page import situation
     from topobelief.page.server import PageServer
@@ -71,10 +73,10 @@ def serve(
 
     reporter = Reporter(as_json=False)
     reading = reading_options(
-        drop, robust_as_plain=robust_as_plain, edge2_order=edge2_order, component=component, planar=planar
+        drop, robust_as_plain=robust_as_plain, edge2_order=edge2_order, component=component, planar=planar, topic=topic
     )
     graph = plan_stages.read_graph(graph_file, reporter, optimized=optimize, reading=reading)
-    world = plan_world.read_world(map_file, graph, reporter, width=width, unknown=unknown)
+    world = plan_world.read_world(map_file, graph, reporter, width=width, unknown=unknown, topic=map_topic)
     begin = plan_ends.choose_start(graph, world, reporter, start)
     rule = CandidateRule(num_vertices=vertices, robot_radius=robot_radius, seed=seed, spacing=spacing)
     answers = Answers(graph, world, begin, rule, max_detour, seconds)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -40,13 +40,17 @@ def read_bag(path: StrPath, options: ReadingOptions) -> ReadGraph:
     notes = [_note(recording) for recording in recordings]
     first = recordings[0]
     if first.kind == MARKERS:
-        markers = [marker for recording in recordings for marker in _markers(path, recording)]
+        markers = [
+            marker
+            for recording in recordings
+            for marker in markers_of_message(path, recording.messages[-1], where=repr(recording.topic))
+        ]
         return graph_of_markers(path, markers, options, notes)
     if first.kind == PATH:
         poses = [stamped.pose for stamped in first.messages[-1].poses]
     else:
         poses = [message.pose.pose for message in first.messages]
-    return graph_along(path, _poses(path, first, poses), options, notes)
+    return graph_along(path, poses_of_messages(path, poses, where=repr(first.topic)), options, notes)
 
 
 def _note(recording: Recording) -> str:
@@ -55,37 +59,43 @@ def _note(recording: Recording) -> str:
     return f"read {which} of {counted(recording.count, 'message')} of {recording.topic!r} ({name})"
 
 
-def _poses(path: StrPath, recording: Recording, poses: list[Any]) -> FloatArray:
-    """Poses of messages, shape (N, 7), N > 0."""
+def poses_of_messages(path: StrPath, poses: Sequence[Any], *, where: str) -> FloatArray:
+    """Poses of messages geometry_msgs/Pose, shape (N, 7), N > 0.
+
+    Raises
+    ------
+    FileError
+        Names the first that is none.
+    """
     if not poses:
-        raise FileError(path, f"expected at least one pose in the last message of {recording.topic!r}, got none")
+        raise FileError(path, f"expected at least one pose in the last message of {where}, got none")
     positions = np.array([_point(pose.position) for pose in poses])
     turned = np.array([[getattr(pose.orientation, name) for name in "xyzw"] for pose in poses])
     far = np.flatnonzero(~(np.abs(positions).max(axis=1) <= FARTHEST))
-    if far.size:
-        _refuse(path, recording, int(far[0]), f"expected positions within {FARTHEST:.0e} m of the origin, got one beyond")
     unit, bad, problem = normalised(turned)
+    if far.size:
+        bad, problem = int(far[0]), f"expected positions within {FARTHEST:.0e} m of the origin, got one beyond"
     if bad is not None:
-        _refuse(path, recording, bad, problem)
+        raise FileError(path, f"{problem} at pose {bad} of {where}")
     return np.column_stack([positions, unit])
 
 
-def _refuse(path: StrPath, recording: Recording, index: int, problem: str) -> None:
-    raise FileError(path, f"{problem} at pose {index} of {recording.topic!r}")
+def markers_of_message(path: StrPath, message: Any, *, where: str) -> Iterator[Marker]:
+    """The markers of a visualization_msgs/MarkerArray.
 
-
-def _markers(path: StrPath, recording: Recording) -> Iterator[Marker]:
-    """The markers of the last message."""
-    for number, message in enumerate(recording.messages[-1].markers):
-        marker = Marker(None, message.ns, message.id, message.type, message.action)
+    Raises
+    ------
+    FileError
+        Names the first with a number that no graph has.
+    """
+    for number, each in enumerate(message.markers):
+        marker = Marker(None, each.ns, each.id, each.type, each.action)
         for part, names in (("position", "xyz"), ("orientation", "xyzw")):
-            marker.pose |= {f"{part}.{name}": getattr(getattr(message.pose, part), name) for name in names}
-        marker.points += [_point(point) for point in message.points]
+            marker.pose |= {f"{part}.{name}": getattr(getattr(each.pose, part), name) for name in names}
+        marker.points += [_point(point) for point in each.points]
         numbers = [*marker.pose.values(), *(value for point in marker.points for value in point)]
         if not all(math.isfinite(value) and abs(value) <= FARTHEST for value in numbers):
-            raise FileError(
-                path, f"expected numbers within {FARTHEST:.0e} m, got another in marker {number} of {recording.topic!r}"
-            )
+            raise FileError(path, f"expected numbers within {FARTHEST:.0e} m, got another in marker {number} of {where}")
         yield marker
 
 

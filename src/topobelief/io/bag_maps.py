@@ -52,7 +52,7 @@ def read_bag_grid(path: StrPath, *, topic: str | None = None) -> OccupancyGrid:
     """
     wanted = [] if topic is None else [topic]
     recording = read_topics(path, (GRID,), wanted, option="--map-topic NAME (in Python topic='NAME')")[0]
-    return _grid(path, recording.messages[-1], f"the last message of {recording.topic!r}")
+    return grid_of_message(path, recording.messages[-1], where=f"the last message of {recording.topic!r}")
 
 
 def read_bag_map(path: StrPath, *, unknown: Unknown = "occupied", topic: str | None = None) -> World:
@@ -63,7 +63,17 @@ def read_bag_map(path: StrPath, *, unknown: Unknown = "occupied", topic: str | N
     FileError
         As `read_bag_grid` does, and where nothing is free.
     """
-    grid = read_bag_grid(path, topic=topic)
+    return world_of_grid(path, read_bag_grid(path, topic=topic), unknown=unknown)
+
+
+def world_of_grid(path: StrPath, grid: OccupancyGrid, *, unknown: Unknown = "occupied") -> World:
+    """The world of an occupancy grid.
+
+    Raises
+    ------
+    FileError
+        Where nothing is free.
+    """
     free = (grid.cells == 0) | ((grid.cells == -1) & (unknown == "free"))
     try:
         return World.from_cells(free, grid.resolution, grid.origin)
@@ -71,7 +81,14 @@ def read_bag_map(path: StrPath, *, unknown: Unknown = "occupied", topic: str | N
         raise FileError(path, str(error)) from None
 
 
-def _grid(path: StrPath, message: Any, where: str) -> OccupancyGrid:
+def grid_of_message(path: StrPath, message: Any, *, where: str) -> OccupancyGrid:
+    """The grid of a nav_msgs/OccupancyGrid.
+
+    Raises
+    ------
+    FileError
+        Where it is malformed.
+    """
     info = message.info
     rows, columns, resolution = info.height, info.width, float(f"{info.resolution:.7g}")  # of 32 bits
     values = np.asarray(message.data)

@@ -1,4 +1,4 @@
-"""Answers for the page: what `topobelief plan` would say to a question, with all that a picture of it needs."""
+"""Answers to questions, for the page and for ROS: what `topobelief plan` would say, with all that a picture of it needs."""
 
 from __future__ import annotations
 
@@ -154,6 +154,7 @@ class Answers:
             "certificate": reached + plan_certificate.certificate(searched, limits),
             "front": front,
             "limit": found.max_length,
+            "most_to_gain": found.value_now - found.lower_bound,
             **self._ways(searched.proposals, decision, errors, searched=True),
         }
 
@@ -192,7 +193,7 @@ class Answers:
     ) -> Mapping[str, object]:
         why = plan_reasons.reasons(self.graph, self.start, proposals, decision, errors, searched=searched)
         surviving: set[int] = set() if searched else set(decision.survivors.tolist())
-        values = _values(decision)
+        values, ranking = _values(decision), decision.ranking.tolist()
         ways: list[dict[str, object]] = []
         for index, (path, action) in enumerate(zip(proposals.paths, proposals.actions, strict=True)):
             sight, poses = Sight.of(self.graph, self.start, action), path_poses(path)
@@ -204,8 +205,10 @@ class Answers:
                     "closures": counted(len(sight.closures), "closure"),
                     "value": _told(values[index], decision.unit),
                     "standing": standing,
+                    "rank": ranking.index(index),
                     "why": why[index],
                     "path": rounded(path),
+                    "poses": poses.tolist(),
                     "seen": sight.seen.tolist(),
                     "links": rounded(sight.thinned().reshape(-1, 4)),
                     "files": {suffix: path_text(f"way.{suffix}", poses) for suffix in _FORMATS},
