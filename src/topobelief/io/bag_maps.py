@@ -19,6 +19,7 @@ from topobelief.io.files import StrPath
 from topobelief.io.ros_map import LARGEST_RESOLUTION, MAX_CELLS_AWAY, SMALLEST_RESOLUTION, Unknown
 from topobelief.world import World
 
+_TOPIC_OPTION = "--map-topic NAME, or of `topobelief convert` --topic NAME (in Python topic='NAME')"
 _OCCUPIED, _FREE = 65, 25  # percent
 _TILT = 1e-3  # of a quaternion, that a level map may have
 
@@ -51,7 +52,7 @@ def read_bag_grid(path: StrPath, *, topic: str | None = None) -> OccupancyGrid:
         malformed.
     """
     wanted = [] if topic is None else [topic]
-    recording = read_topics(path, (GRID,), wanted, option="--map-topic NAME (in Python topic='NAME')")[0]
+    recording = read_topics(path, (GRID,), wanted, option=_TOPIC_OPTION)[0]
     return _grid(path, recording.messages[-1], f"the last message of {recording.topic!r}")
 
 
