@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from rosbags.rosbag1 import Writer as Writer1
-from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
@@ -89,18 +89,29 @@ def messages_for(format_name: str) -> Messages:
     return Messages("ROS1_NOETIC" if format_name == "ROS 1" else "ROS2_HUMBLE")
 
 
-def write_bag(folder: Path, format_name: str, made: Messages, topics: dict[str, list[Any]]) -> Path:
-    """A bag with these messages, one a second, topic after topic; a folder for ROS 2."""
+def write_bag(
+    folder: Path, format_name: str, made: Messages, topics: dict[str, list[Any]], *, compression: str | None = None
+) -> Path:
+    """A bag with these messages, one a second, topic after topic; a folder for ROS 2.
+
+    Compression is "lz4" or "bz2" for ROS 1, "file" or "message" for ROS 2.
+    """
     if format_name == "ROS 1":
         path, writer = folder / "drive.bag", Writer1(folder / "drive.bag")
     else:
         plugin = StoragePlugin.MCAP if format_name.endswith("MCAP") else StoragePlugin.SQLITE3
         path, writer = folder / "drive", Writer2(folder / "drive", version=9, storage_plugin=plugin)
+    if compression is not None:
+        if isinstance(writer, Writer1):
+            writer.set_compression(Writer1.CompressionFormat[compression.upper()])
+        else:
+            writer.set_compression(CompressionMode[compression.upper()], CompressionFormat.ZSTD)
     encode = made.store.serialize_ros1 if made.ros_1 else made.store.serialize_cdr
     second = 0
     with writer:
         for topic, messages in topics.items():
-            connection = writer.add_connection(topic, messages[0].__msgtype__, typestore=made.store)
+            kind = messages[0].__msgtype__ if messages else "nav_msgs/msg/Path"
+            connection = writer.add_connection(topic, kind, typestore=made.store)
             for message in messages:
                 second += 1
                 writer.write(connection, second * 10**9, encode(message, message.__msgtype__))

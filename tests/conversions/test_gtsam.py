@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
 from pathlib import Path
 
@@ -11,6 +12,9 @@ import pytest
 from hypothesis import given
 
 from graphs import SE2_GROUP, SE3_GROUP, pose_graphs
+from topobelief.candidates.closures import ClosureModel
+from topobelief.candidates.roadmap import build_roadmap
+from topobelief.candidates.seen_again import described, seen_again
 from topobelief.conversions.gtsam import action_to_gtsam, from_gtsam, to_gtsam
 from topobelief.entropy import joint_entropy
 from topobelief.errors import InvalidInputError, ReadingWarning
@@ -18,7 +22,9 @@ from topobelief.graph.action import Action, posterior
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.g2o import read_g2o, write_g2o
 from topobelief.planning.planner import Planner
+from topobelief.search.roadmap_search import search_roadmap
 from topobelief.symbols import id_of_key, node_name
+from topobelief.world import World
 
 UNIT = gtsam.noiseModel.Unit.Create(3)
 
@@ -260,3 +266,24 @@ def test_a_decision_goes_back_to_gtsam_and_leaves_the_entropy_that_was_promised(
     entropy = 15 / 2 * np.log(2 * np.pi * np.e) - np.linalg.slogdet(information)[1] / 2
     assert joint_entropy(posterior(graph, chosen)) == pytest.approx(entropy, abs=1e-8)
     assert from_gtsam(isam).ids.tolist() == posterior(graph, chosen).ids.tolist()
+
+
+def test_a_search_on_an_isam2_gives_factors_and_values_and_names_symbols():
+    """Out of a corridor and back: the way to the goal sees x0 or its neighbours again, and the update takes its factors."""
+    isam, factors, values = gtsam.ISAM2(), gtsam.NonlinearFactorGraph(), gtsam.Values()
+    poses = [(0, 0, 0), (1, 0, 0), (2, 0, 0), (3, 0, np.pi / 2), (3, 1, np.pi / 2), (3, 2, np.pi / 2)]
+    noise = gtsam.noiseModel.Diagonal.Sigmas(np.array([0.1, 0.1, 0.05]))
+    factors.add(gtsam.PriorFactorPose2(gtsam.symbol("x", 0), gtsam.Pose2(), noise))
+    for k, pose in enumerate(poses):
+        values.insert(gtsam.symbol("x", k), gtsam.Pose2(*pose))
+    for k, (a, b) in enumerate(pairwise([gtsam.Pose2(*pose) for pose in poses])):
+        factors.add(gtsam.BetweenFactorPose2(gtsam.symbol("x", k), gtsam.symbol("x", k + 1), a.between(b), noise))
+    isam.update(factors, values)
+    graph = from_gtsam(isam)
+    hall = World.from_boxes([], bounds=(-2, -2, 5, 5))
+    roadmap = build_roadmap(hall, (3, 2), (0, 1), num_vertices=60, robot_radius=0.2)
+    found = search_roadmap(graph, roadmap, goal=(0, 1), closures=ClosureModel(radius=1.5), world=hall, max_evaluations=30)
+    assert re.search(r"sees poses? x[0-4]", described(graph, seen_again(graph, graph.num_poses - 1, found.action)))
+    new_factors, new_values = action_to_gtsam(graph, found.action)
+    isam.update(new_factors, new_values)
+    assert isam.calculateEstimate().size() == graph.num_poses + found.action.num_new_poses

@@ -120,6 +120,22 @@ def test_a_bag_is_told_by_its_content_and_may_be_the_file_within_the_folder(name
         read_graph_file(damaged, options())
 
 
+@pytest.mark.parametrize("compression", ["lz4", "bz2", "file", "message"])
+def test_compressed_bags_are_read(compression: str, tmp_path: Path):
+    name = "ROS 1" if compression in ("lz4", "bz2") else "ROS 2 SQLite"
+    made = messages_for(name)
+    topics = {"/odom": [made.odometry(*place) for place in PLACES], "/map": [made.grid(np.zeros((2, 2)))]}
+    bag = write_bag(tmp_path, name, made, topics, compression=compression)
+    assert read_graph_file(bag, options()).graph.num_poses == 4
+    assert read_bag_grid(bag).cells.tolist() == [[0, 0], [0, 0]]
+
+
+def test_a_topic_without_messages_is_passed_over(tmp_path: Path):
+    made = Messages()
+    bag = write_bag(tmp_path, "ROS 2 MCAP", made, {"/odom": [made.odometry(0, 0), made.odometry(1, 0)], "/path": []})
+    assert read_graph_file(bag, options()).graph.num_poses == 2
+
+
 def test_messages_with_impossible_numbers_are_named(tmp_path: Path):
     made = Messages()
     still = made.pose(1, 0)

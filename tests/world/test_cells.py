@@ -78,3 +78,10 @@ def test_obstacles_that_touch_at_a_corner_only_do_not_let_sight_through() -> Non
 def test_refuses_what_is_not_a_grid(cells: np.ndarray, resolution: float, origin: tuple, message: str) -> None:
     with pytest.raises(InvalidMapError, match=message):
         World.from_cells(cells, resolution, origin)
+
+
+def test_noise_is_refused_before_its_polygons_are_made(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("topobelief.world.cells._MOST_RUNS", 100)
+    board = np.indices((20, 20)).sum(axis=0) % 2 == 0
+    with pytest.raises(InvalidMapError, match=r"at most 100 straight pieces in each direction, got \d+; this looks like noise"):
+        World.from_cells(board, 0.1)

@@ -56,7 +56,7 @@ Topic = Annotated[
     list[str] | None,
     typer.Option(
         metavar="NAME",
-        help="Of a bag, the topic that holds the graph; may be repeated for markers that draw it together.",
+        help="Of a bag, the topic to read; may be repeated for markers that draw one graph together.",
         show_default="the only one",
         rich_help_panel=_READING,
     ),

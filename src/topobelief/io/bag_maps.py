@@ -16,9 +16,10 @@ from topobelief.geometry.planar import headings_of_quaternions
 from topobelief.io.bags import GRID, read_topics
 from topobelief.io.filed_path import normalised
 from topobelief.io.files import StrPath
-from topobelief.io.ros_map import LARGEST_RESOLUTION, MAX_CELLS_AWAY, SMALLEST_RESOLUTION, Unknown
+from topobelief.io.ros_map import LARGEST_RESOLUTION, MAX_CELLS_AWAY, MAX_PIXELS, SMALLEST_RESOLUTION, Unknown
 from topobelief.world import World
 
+_TOPIC_OPTION = "--map-topic NAME, or of `topobelief convert` --topic NAME (in Python topic='NAME')"
 _OCCUPIED, _FREE = 65, 25  # percent
 _TILT = 1e-3  # of a quaternion, that a level map may have
 
@@ -51,7 +52,7 @@ def read_bag_grid(path: StrPath, *, topic: str | None = None) -> OccupancyGrid:
         malformed.
     """
     wanted = [] if topic is None else [topic]
-    recording = read_topics(path, (GRID,), wanted, option="--map-topic NAME (in Python topic='NAME')")[0]
+    recording = read_topics(path, (GRID,), wanted, option=_TOPIC_OPTION)[0]
     return grid_of_message(path, recording.messages[-1], where=f"the last message of {recording.topic!r}")
 
 
@@ -94,6 +95,10 @@ def grid_of_message(path: StrPath, message: Any, *, where: str) -> OccupancyGrid
     values = np.asarray(message.data)
     if rows * columns != len(values) or len(values) == 0:
         raise FileError(path, f"expected {rows} x {columns} cells in {where}, got {len(values)}")
+    if len(values) > MAX_PIXELS:
+        raise FileError(
+            path, f"expected at most {MAX_PIXELS / 1e6:g} million cells in {where}, got {len(values) / 1e6:.0f} million"
+        )
     if not SMALLEST_RESOLUTION <= resolution <= LARGEST_RESOLUTION:
         expected = f"{SMALLEST_RESOLUTION:g} to {LARGEST_RESOLUTION:g} metres a cell"
         raise FileError(path, f"expected a resolution of {expected} in {where}, got {resolution:g}")
@@ -105,6 +110,7 @@ def grid_of_message(path: StrPath, message: Any, *, where: str) -> OccupancyGrid
         raise FileError(path, f"expected a level map in {where}, got a tilted one")
     if not max(abs(corner.x), abs(corner.y)) <= MAX_CELLS_AWAY * resolution:
         raise FileError(path, f"expected an origin within {MAX_CELLS_AWAY:g} cells of (0, 0) in {where}, got another")
-    cells = np.select([values < 0, values >= _OCCUPIED, values <= _FREE], [-1, 100, 0], -1).astype(np.int8)
+    cells = np.full(len(values), -1, dtype=np.int8)
+    cells[values >= _OCCUPIED], cells[(values >= 0) & (values <= _FREE)] = 100, 0
     yaw = float(headings_of_quaternions(unit)[0])
     return OccupancyGrid(cells.reshape(rows, columns), resolution, (float(corner.x), float(corner.y), yaw))

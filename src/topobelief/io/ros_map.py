@@ -38,7 +38,7 @@ _OCCUPIED_COLOUR, _UNKNOWN_COLOUR, _FREE_COLOUR = 0, 205, 254  # of map_saver
 _DAMAGE = (ArithmeticError, EOFError, LookupError, NotImplementedError, SyntaxError, TypeError, ValueError, struct.error)
 """What Pillow's decoders raise on damaged images, besides OSError."""
 
-_MAX_PIXELS = 150_000_000  # some 1.2 GB and 8 s
+MAX_PIXELS = 150_000_000  # some 1.2 GB and 8 s
 SMALLEST_RESOLUTION, LARGEST_RESOLUTION = 1e-6, 1e6  # metres a pixel
 _COARSE = 2.0  # metres a pixel, above which millimetres are more likely
 MAX_CELLS_AWAY = 1e9  # from the origin of the world, at which coordinates still resolve a millionth of a cell
@@ -216,7 +216,7 @@ def _require_file(path: StrPath, image_path: Path) -> None:
 def _require_pixels_of_maps(image: Image.Image, path: Path) -> None:
     """Refuse, before anything is decoded, what is too large, shifted or not of 8 or 16 bits a channel."""
     width, height = image.size
-    if width * height > _MAX_PIXELS:
+    if width * height > MAX_PIXELS:
         raise _too_large(path, f"{width} x {height}")
     if image.mode == "F" or (image.mode == "I" and image.format not in ("PNG", "PPM")):  # there Pillow's I is 16 bits
         kind = "floating-point numbers" if image.mode == "F" else "signed or 32-bit integers"
@@ -243,7 +243,7 @@ def _has_crlf(image: Image.Image, path: Path) -> bool:
 def _too_large(path: Path, got: str) -> FileError:
     return FileError(
         path,
-        f"expected an image of at most {_MAX_PIXELS / 1e6:g} million pixels, got {got}; crop the map, or save it with "
+        f"expected an image of at most {MAX_PIXELS / 1e6:g} million pixels, got {got}; crop the map, or save it with "
         "larger cells (half the width and height, twice the resolution)",
     )
 

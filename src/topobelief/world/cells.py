@@ -16,6 +16,8 @@ from topobelief.arrays import BoolArray, FloatArray, IntArray, frozen_floats
 from topobelief.errors import InvalidMapError
 from topobelief.world import shapes
 
+_MOST_RUNS = 500_000  # in one direction; with so many in both, polygons take some 10 s and 1 GB
+
 
 class GridRegion(NamedTuple):
     """The free part of a grid, and the whole of it, in the world frame."""
@@ -39,7 +41,7 @@ def region_of_cells(free: ArrayLike, resolution: float, origin: Sequence[float])
     Raises
     ------
     InvalidMapError
-        Where the shape, resolution or origin is wrong.
+        Where the shape, resolution or origin is wrong, or the outline has more than a million pieces.
     """
     cells = np.asarray(free)
     if cells.ndim != 2 or cells.size == 0 or cells.dtype != np.bool_:
@@ -85,6 +87,12 @@ def outline_runs(cells: BoolArray) -> tuple[FloatArray, FloatArray]:
 def _runs(signs: NDArray[np.int8]) -> tuple[IntArray, IntArray, IntArray]:
     """Runs of equal signs along the rows, zeros left out: row, first column and the one past the last."""
     steps = [np.diff(np.pad(signs == sign, ((0, 0), (1, 1))).astype(np.int8), axis=1) for sign in (1, -1)]
+    count = sum(int(np.count_nonzero(step == 1)) for step in steps)
+    if count > _MOST_RUNS:
+        raise InvalidMapError(
+            f"expected a map whose outline has at most {_MOST_RUNS} straight pieces in each direction, got {count}; "
+            "this looks like noise: remove specks, or save the map with larger cells"
+        )
     row, first = np.concatenate([np.argwhere(step == 1) for step in steps]).T
     last = np.concatenate([np.argwhere(step == -1) for step in steps])[:, 1]
     return row, first, last
