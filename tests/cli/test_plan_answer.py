@@ -10,6 +10,7 @@ import pytest
 
 from topobelief.cli.plan_candidates import Proposals
 from topobelief.cli.plan_draws import finalists
+from topobelief.cli.plan_ends import Goal
 from topobelief.cli.plan_errors import PlanErrors, answer, centimetres
 from topobelief.estimation import optimize
 from topobelief.graph.action import Action
@@ -51,12 +52,13 @@ def proposals_of(goals: list[int | None]) -> Proposals:
     return Proposals([np.zeros((2, 2))] * len(goals), [stay] * len(goals), goals)
 
 
+KITCHEN, HALL = Goal(np.array([1.0, 2.0]), "(1.00, 2.00)"), Goal(np.array([3.0, 0.0]), "pose 7")
 NOW, CHOSEN, SHORTEST = ExpectedErrors(0.131, 0.0), ExpectedErrors(0.084, 0.04), ExpectedErrors(0.119, 0.09)
 TWO = decision_of([0.1, 0.084], [0.119, 0.084], [0.119, 0.084], best=1, lengths=[12.1, 14.3])
 
 
 def test_the_first_sentence_says_what_to_drive_and_what_it_does():
-    told = answer(proposals_of([0, 0]), TWO, PlanErrors(0, NOW, CHOSEN, SHORTEST))
+    told = answer(proposals_of([0, 0]), TWO, PlanErrors(0, NOW, CHOSEN, SHORTEST), [KITCHEN])
     assert told.startswith(
         "Drive path 1 (14.3 m, 2.2 m more than the shortest): expected map error 8.4 cm instead of 11.9; "
         "at the goal 4.0 cm instead of 9.0. "
@@ -66,8 +68,16 @@ def test_the_first_sentence_says_what_to_drive_and_what_it_does():
 
 def test_where_the_shortest_is_chosen_the_comparison_is_with_now():
     best = decision_of([0.084, 0.1], [0.084, 0.119], [0.084, np.nan], best=0, lengths=[12.1, 14.3])
-    told = answer(proposals_of([0, 0]), best, PlanErrors(0, NOW, CHOSEN, CHOSEN))
+    told = answer(proposals_of([0, 0]), best, PlanErrors(0, NOW, CHOSEN, CHOSEN), [KITCHEN])
     assert told == "Drive path 0 (12.1 m, the shortest): expected map error 8.4 cm instead of 13.1 now; at the goal 4.0 cm."
+
+
+def test_of_several_goals_the_shortest_is_named_with_its_own():
+    told = answer(proposals_of([1, 1]), TWO, PlanErrors(0, NOW, CHOSEN, SHORTEST), [KITCHEN, HALL])
+    assert "Drive path 1 (14.3 m, 2.2 m more than the shortest to pose 7)" in told
+    assert "That is against path 0, the shortest to pose 7;" in told
+    elsewhere = answer(proposals_of([None, None]), TWO, PlanErrors(0, NOW, CHOSEN, SHORTEST), [KITCHEN, HALL])
+    assert "2.2 m more than the shortest of those to none of the goals)" in elsewhere
 
 
 def test_each_goal_has_its_own_shortest_path():

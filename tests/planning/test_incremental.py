@@ -16,7 +16,6 @@ from topobelief.graph.action import Action, posterior
 from topobelief.graph.fisher import fisher_rows
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.g2o import read_g2o
-from topobelief.planning import incremental_engine
 from topobelief.planning.engine import ScratchEngine
 from topobelief.planning.incremental_engine import IncrementalEngine
 
@@ -298,15 +297,38 @@ def test_bounds_share_the_signature_s_increments_and_exact_values_those_of_ancho
     np.testing.assert_allclose(values, expected, rtol=1e-14, atol=errors.max())
 
 
-def test_an_action_that_closes_too_many_loops_for_a_dense_matrix_is_evaluated_from_scratch(monkeypatch):
+@pytest.mark.parametrize("family", ["fischer", "anchored", "chain"])
+def test_after_many_closures_a_new_factor_of_the_graph_takes_the_place_of_increments(monkeypatch, family):
     graph, actions = a_session(num_poses=12)
-    monkeypatch.setattr(incremental_engine, "_MAX_CLOSURE_ROWS", 12)
-    assert min(action.num_closures for action in actions) * 3 <= 12 < max(action.num_closures for action in actions) * 3
-    signatures, lower, upper, entropies, _ = from_scratch(graph, actions)
-    found = judge(graph)
-    np.testing.assert_allclose(found.signatures(actions)[0], signatures, rtol=1e-12)
-    np.testing.assert_allclose(found.bounds(actions), [lower, upper], rtol=1e-10)
+    rows = 3 * np.array([action.num_closures for action in actions])
+    limit = int(np.median(rows))
+    expected = judge(graph, bounds=family).bounds(actions)
+    monkeypatch.setattr(increments, "_CUBES_A_VARIABLE", limit**3 / (3 * graph.num_poses))
+    signatures, _, _, entropies, _ = from_scratch(graph, actions)
+    found = judge(graph, bounds=family)
+    anew = []
+    alone = IncrementalEngine.from_scratch
+    monkeypatch.setattr(IncrementalEngine, "from_scratch", lambda self, action: anew.append(action) or alone(self, action))
     np.testing.assert_allclose(found.entropies(actions)[0], entropies, rtol=1e-12)
+    assert anew == [action for action, count in zip(actions, rows, strict=True) if count > limit]
+    assert 0 < len(anew) < len(actions)
+    np.testing.assert_allclose(found.signatures(actions)[0], signatures, rtol=1e-12)
+    low, high = found.bounds(actions)
+    assert (low <= entropies + 1e-9).all()
+    assert (entropies <= high + 1e-9).all()
+    few = rows <= limit
+    np.testing.assert_allclose(np.array([low, high])[:, few], np.array(expected)[:, few], rtol=1e-10)
+
+
+def test_many_closures_are_few_on_a_larger_graph():
+    """What a new factor costs grows with the graph, what a dense factor of the closures costs does not."""
+    for num_poses, anew in ((30, True), (3000, False)):
+        rng = np.random.default_rng(0)
+        graph = random_pose_graph(rng, Noise(SE2_GROUP, "equal", 100.0, 0.4, 2.0), num_poses, 0)
+        pairs = np.stack([rng.integers(0, 10, 100), rng.integers(15, 25, 100)], axis=1)
+        action = Action([], pairs, np.eye(3) * 100)
+        forms = judge(graph).engine.groups([action])[0][1]
+        assert np.isnan(forms.log_det("joint").value[0]) == anew
 
 
 @pytest.mark.parametrize("name", [RECORDED, "csail.g2o", "intel.g2o", "parking-garage.g2o"])

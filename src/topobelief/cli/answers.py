@@ -150,7 +150,7 @@ class Answers:
         reached = "" if found.sees_map else "No place in reach sees the map again. "
         return {
             "progress": f"{counted(found.num_evaluations, 'way')} evaluated in {found.seconds:.1f} s",
-            "headline": plan_certificate.headline(searched, decision, errors, limits),
+            "headline": plan_certificate.headline(searched, decision, errors, goals, limits),
             "certificate": reached + plan_certificate.certificate(searched, limits),
             "front": front,
             "limit": found.max_length,
@@ -172,7 +172,7 @@ class Answers:
         note = rate_warning(self.graph, self.models[question.closures], proposals.actions)
         return {
             "progress": f"{counted(len(proposals.paths), 'path')} compared in {time.monotonic() - begin:.1f} s",
-            "headline": plan_errors.answer(proposals, decision, errors),
+            "headline": plan_errors.answer(proposals, decision, errors, _goals(question)),
             "certificate": decision.summary(),
             "front": [],
             "limit": max(map(path_length, proposals.paths)),

@@ -1,4 +1,4 @@
-"""How a command line is read: no option is silently dropped, and places take one value or two."""
+"""How a command line is read: no option is silently dropped, places take one value or two, and errors name options."""
 
 from __future__ import annotations
 
@@ -8,9 +8,15 @@ from typing import Any
 import typer
 from typer.core import TyperCommand
 
+from topobelief.cli.options_as_typed import name_options
+from topobelief.errors import TopobeliefError
+
 
 class Command(TyperCommand):
-    """A command that refuses an option given twice, because the first value would be dropped silently."""
+    """A command that refuses an option given twice, because the first value would be dropped silently.
+
+    Errors of the library name its options in place of arguments.
+    """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse as usual, after the check."""
@@ -20,6 +26,14 @@ class Command(TyperCommand):
                 times = "twice" if count == 2 else f"{count} times"
                 raise typer.BadParameter(f"expected it once, got it {times}.", ctx=ctx, param_hint=f"'{parameter.opts[0]}'")
         return super().parse_args(ctx, args)
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run as usual."""
+        try:
+            return super().invoke(ctx)
+        except TopobeliefError as error:
+            name_options(error, self.params)
+            raise
 
 
 class PlaceCommand(Command):

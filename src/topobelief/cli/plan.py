@@ -179,9 +179,9 @@ def plan(
     errors = plan_errors.expected(graph, found, decision, reporter)
     reasons = plan_reasons.reasons(graph, begin, found, decision, errors, searched=mode.searches)
     if searched is not None:
-        plan_certificate.say_search(searched, decision, errors, limits, reporter)
+        plan_certificate.say_search(searched, decision, errors, goals, limits, reporter)
     else:
-        answer = plan_errors.answer(found, decision, errors)
+        answer = plan_errors.answer(found, decision, errors, goals)
         plan_stages.say_decision(decision, answer, rule, reporter, along_trajectory=along_trajectory)
 
     def detailed(index: int) -> list[str]:

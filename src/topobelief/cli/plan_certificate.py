@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Literal
 
 from topobelief.cli.console import Reporter
+from topobelief.cli.plan_ends import Goal
 from topobelief.cli.plan_errors import PlanErrors, answer, centimetres
 from topobelief.cli.plan_search import POINTS_TOLD, Limits, Searched
 from topobelief.planning.decision import Decision
@@ -23,7 +25,9 @@ _QUANTITIES = {
 }
 
 
-def say_search(searched: Searched, decision: Decision, errors: PlanErrors, limits: Limits, reporter: Reporter) -> None:
+def say_search(
+    searched: Searched, decision: Decision, errors: PlanErrors, goals: Sequence[Goal], limits: Limits, reporter: Reporter
+) -> None:
     """The answer, the certificate and the front."""
     found = searched.found
     reporter.say("")
@@ -32,15 +36,17 @@ def say_search(searched: Searched, decision: Decision, errors: PlanErrors, limit
     nothing = not found.sees_map and found.stopped_by in ("proof", "rest")
     if nothing:
         reporter.say(f"Nothing to gain within {found.max_length:.1f} m: no place in reach sees the map again.")
-    reporter.say(headline(searched, decision, errors, limits))
+    reporter.say(headline(searched, decision, errors, goals, limits))
     if not nothing:
         reporter.say(certificate(searched, limits), front_table(found, POINTS_TOLD, names=searched.names))
 
 
-def headline(searched: Searched, decision: Decision, errors: PlanErrors, limits: Limits) -> str:
+def headline(
+    searched: Searched, decision: Decision, errors: PlanErrors, goals: Sequence[Goal], limits: Limits
+) -> str:
     """What to drive, and what that does to the map."""
     if searched.has_goal:
-        return answer(searched.proposals, decision, errors)
+        return answer(searched.proposals, decision, errors, goals)
     return _trip(searched.found, decision, errors, limits)
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from topobelief.cli.console import Reporter
 from topobelief.cli.plan_candidates import Proposals
+from topobelief.cli.plan_ends import Goal
 from topobelief.errors import IllConditionedError, NotOptimizedWarning
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.decision import Decision
@@ -51,13 +53,14 @@ def expected(graph: PoseGraph, proposals: Proposals, decision: Decision, reporte
     return PlanErrors(shortest, now, after, after_shortest)
 
 
-def answer(proposals: Proposals, decision: Decision, errors: PlanErrors) -> str:
+def answer(proposals: Proposals, decision: Decision, errors: PlanErrors, goals: Sequence[Goal]) -> str:
     """What to drive and what it does to the map, in a sentence or two."""
     best = decision.best
+    the_shortest = f"the shortest{_of_which(goals, proposals.goals[best])}"
     length, least = (decision.candidates[index].length for index in (best, errors.shortest_path))
     shortest = errors.shortest_path == best
     alone = sum(goal == proposals.goals[best] for goal in proposals.goals) == 1
-    extra = "" if alone else ", the shortest" if shortest else f", {length - least:.1f} m more than the shortest"
+    extra = "" if alone else f", {the_shortest}" if shortest else f", {length - least:.1f} m more than {the_shortest}"
     drive = f"Drive {decision.name(best)} ({length:.1f} m{extra})"
     if errors.now is None or errors.chosen is None or errors.shortest is None:
         return f"{drive}."
@@ -71,8 +74,15 @@ def answer(proposals: Proposals, decision: Decision, errors: PlanErrors) -> str:
     now = centimetres(errors.now.map_rmse)[0]
     return (
         f"{drive}: {map_error}; at the goal {at_goal[0]} cm instead of {at_goal[1]}. "
-        f"That is against {decision.name(errors.shortest_path)}, the shortest; now the map's expected error is {now} cm."
+        f"That is against {decision.name(errors.shortest_path)}, {the_shortest}; now the map's expected error is {now} cm."
     )
+
+
+def _of_which(goals: Sequence[Goal], goal: int | None) -> str:
+    """Of which paths the shortest is meant, where they lead to several goals."""
+    if len(goals) < 2:
+        return ""
+    return " of those to none of the goals" if goal is None else f" to {goals[goal].name}"
 
 
 def centimetres(*metres: float) -> tuple[str, ...]:

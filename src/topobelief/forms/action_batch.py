@@ -47,6 +47,11 @@ class ActionBatch:
         return np.array([len(action.edges) for action in self.actions])
 
     @cached_property
+    def num_closures(self) -> IntArray:
+        """Loop closures of each action, shape (K,)."""
+        return np.array([action.num_closures for action in self.actions])
+
+    @cached_property
     def edge_start(self) -> IntArray:
         """Where the edges of each action begin, shape (K + 1,)."""
         return np.concatenate([[0], np.cumsum(self.num_edges)])

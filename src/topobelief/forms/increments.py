@@ -17,7 +17,6 @@ from topobelief.graph.topology import Topology
 from topobelief.linalg.elimination_paths import FormFactor
 from topobelief.linalg.estimate import UNIT_ROUNDOFF, Estimate
 from topobelief.linalg.increments import Increments, Wanted, diagonal_increments, log_det_increments
-from topobelief.linalg.inverse_traces import COMPILED_SIZE
 
 _LARGEST_ERROR = 1.0  # nats; a factor with a larger error is not used
 _QR_SIZE = 1200  # up to here an evaluation from scratch may do better, by QR, than a factor
@@ -27,6 +26,7 @@ _LARGEST_RELATIVE_ERROR = 0.02
 _GAIN_ERRORS = 3.0  # I + R enters once, what is seen of the solutions twice
 _OPERATIONS = 64
 _LEAST_HEAVY = 400  # rows of closures up to which increments of a trace cost less than anything else
+_CUBES_A_VARIABLE = 25_000  # of rows of closures, per variable of the graph: there a new factor costs as much as increments
 
 
 class IncrementalForms(Forms[FloatArray], ClosureForms[FloatArray]):
@@ -166,9 +166,8 @@ class IncrementalForms(Forms[FloatArray], ClosureForms[FloatArray]):
 
         A solution costs m^2 with the dense factor of m rows of closures, and as much as there are entries in that of the graph.
         """
-        rows = factor.block_size * np.array([action.num_closures for action in self._batch.actions])
-        small = factor.tree.num_free * factor.block_size <= COMPILED_SIZE
-        return small | (rows**2 <= max(_LEAST_HEAVY**2, len(factor.tree.rows) * factor.block_size**2))
+        rows = factor.block_size * self._batch.num_closures
+        return rows**2 <= max(_LEAST_HEAVY**2, len(factor.tree.rows) * factor.block_size**2)
 
     @property
     def increments(self) -> IncrementalForms:
@@ -220,23 +219,33 @@ class IncrementalForms(Forms[FloatArray], ClosureForms[FloatArray]):
             wanted = "parts"
         key = form, shift, wanted
         if key not in self._known:
-            first_rows = self._prior.graph.group.position_dim
+            rows = form_of(form, self._batch)
             self._known[key] = log_det_increments(
                 self._prior.factor(form, shift),
                 self._batch.extensions,
-                form_of(form, self._batch),
+                rows,
                 shift=shift,
                 wanted=wanted,
-                first_rows=first_rows,
+                first_rows=self._prior.graph.group.position_dim,
+                wanted_of=self._cheaper(rows.block_size),
             )
         return self._known[key]
+
+    def _cheaper(self, block_size: int) -> BoolArray:
+        """Actions after which a log-determinant costs less by increments than by a new factor of the graph, shape (K,).
+
+        The former takes a dense factor of m rows of closures, m^3; the latter grows with the graph.
+        """
+        num_rows = block_size * self._batch.num_closures
+        return num_rows**3 <= _CUBES_A_VARIABLE * block_size * self._prior.graph.num_poses
 
     def _increments_of_new_poses(self, form: FormName) -> Increments:
         """Those of a computation of the whole form will do; without one, the prior need not be factored."""
         for wanted in ("closures", "parts"):
             if (form, 0.0, wanted) in self._known:
                 return self._known[form, 0.0, wanted]
-        return log_det_increments(None, self._batch.extensions, form_of(form, self._batch))
+        rows = form_of(form, self._batch)
+        return log_det_increments(None, self._batch.extensions, rows, wanted_of=self._cheaper(rows.block_size))
 
     def _known_of(self, form: FormName) -> Increments | None:
         """Any computation of a form so far."""

@@ -13,7 +13,7 @@ from topobelief.linalg.estimate import Estimate
 from topobelief.linalg.inverse import InverseSolver
 from topobelief.optional import has_kernels
 
-COMPILED_SIZE = 3500  # variables beyond which loading compiled kernels is worth its time
+COMPILED_SIZE = 1200  # variables beyond which loading compiled kernels is worth its time, and a QR takes too long
 
 
 def inverse_traces(form: EdgeForm, num_nodes: int, wanted: list[tuple[IntArray, FloatArray]]) -> list[Estimate[float]]:

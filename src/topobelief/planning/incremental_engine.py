@@ -14,8 +14,6 @@ from topobelief.graph.alignment import DEFAULT_SAMPLE_SIZE
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.engine import Engine, Group
 
-_MAX_CLOSURE_ROWS = 1500  # a dense Cholesky factor of this size takes as long as a sparse one of a large graph
-
 
 class IncrementalEngine(Engine):
     """Forms by increments; factors of the prior are kept.
@@ -42,13 +40,8 @@ class IncrementalEngine(Engine):
         self._prior = PriorFactors(graph, anchor, earlier=earlier, sample_size=sample_size)
 
     def groups(self, actions: Sequence[Action]) -> list[Group]:
-        """All at once but for those that close so many loops that their dense part costs more than the graph."""
-        kappa = self.graph.tangent_dim
-        light = [place for place, action in enumerate(actions) if kappa * action.num_closures <= _MAX_CLOSURE_ROWS]
-        if not light:
-            return []
-        batch = ActionBatch(self.graph, tuple(actions[place] for place in light))
-        return [(np.array(light), IncrementalForms(self._prior, batch))]
+        """All at once; what a new factor of the graph gives at less cost, after many closures, is left to `from_scratch`."""
+        return [(np.arange(len(actions)), IncrementalForms(self._prior, ActionBatch(self.graph, tuple(actions))))]
 
     def extended(self, graph: PoseGraph, anchor: int) -> IncrementalEngine:
         """Orders of elimination are kept, and those parts of each factor below which nothing has changed."""

@@ -62,7 +62,8 @@ class Panel:
     def region(self, shape: MultiPolygon, **look: Any) -> None:
         """Polygons with holes, filled and outlined."""
         outline = cast("Any", Outline).make_compound_path(*(_outline(polygon) for polygon in shape.geoms))
-        self.axes.add_patch(cast("Any", PathPatch)(outline, **look))
+        self.axes.add_artist(cast("Any", PathPatch)(outline, **look))  # add_patch takes seconds to find the extent of curves
+        self.axes.update_datalim(np.reshape(shape.bounds, (2, 2)))
 
     def rectangle(self, x_min: float, y_min: float, width: float, height: float, **look: Any) -> None:
         """An axis-aligned rectangle."""

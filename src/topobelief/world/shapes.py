@@ -6,7 +6,7 @@ Predicates are exact to rounding; shapes with round parts have chords in place o
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, cast
 
 import numpy as np
@@ -14,7 +14,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely import MultiPolygon, Point, Polygon
 
-from topobelief.arrays import BoolArray, FloatArray, IntArray
+from topobelief.arrays import BoolArray, FloatArray, IntArray, read_only
 
 Shape = shapely.Geometry
 ShapeArray = NDArray[Any]  # of shapely geometries, dtype object
@@ -114,10 +114,11 @@ def polygons(shape: Shape) -> list[Polygon]:
     return [part for part in _shapely.get_parts(shape) if isinstance(part, Polygon) and part.area > 0]
 
 
+@lru_cache(maxsize=2)  # a roadmap asks twice for those of the region that the robot can reach
 def triangles(polygon: Polygon) -> FloatArray:
     """Triangles with the polygon's own corners that make it up (a constrained Delaunay triangulation), shape (T, 3, 2)."""
     pieces = _shapely.get_parts(_shapely.constrained_delaunay_triangles(polygon))
-    return _shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3]
+    return read_only(_shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3])
 
 
 def corners(polygon: Polygon, tolerance: float) -> tuple[FloatArray, FloatArray, FloatArray]:
