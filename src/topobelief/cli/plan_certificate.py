@@ -110,6 +110,7 @@ def document(searched: Searched, limits: Limits) -> dict[str, object]:
         "max_length": found.max_length,
         "sees_map": found.sees_map,
         "front": found.front.tolist(),
+        "front_bounds": found.front_bounds.tolist(),
         "stopped_by": found.stopped_by,
         "num_evaluations": found.num_evaluations,
         "enough": None if limits.enough is None else verdict(found, limits.enough),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
@@ -18,6 +19,7 @@ Predict = Callable[[list[FloatArray]], list[Action]]
 
 SAME_VALUE = 1e-9  # relative: values that differ by less are equal
 _NUM_LANDMARKS = 16
+_ROUNDING = 1e-9  # relative: lengths that differ by less are equal
 
 
 class Evaluations:
@@ -92,6 +94,11 @@ class Evaluations:
         least = values.min()
         equal = np.flatnonzero(values <= least + SAME_VALUE * max(1e-3, abs(least)))
         return walks[equal[np.lexsort((values[equal], lengths[equal]))[0]]]
+
+    def best_within(self, length: float) -> float:
+        """The least objective of the walks of up to a length, cost excluded; inf where there is none."""
+        values = [self.objectives[walk] for walk, metres in self.lengths.items() if metres <= length * (1 + _ROUNDING)]
+        return min(values, default=math.inf)
 
     def different(self, order: Iterable[int], count: int, apart: float) -> list[Walk]:
         """The first `count` walks of an order that are more than a distance from each other (Fréchet, metres)."""

@@ -173,7 +173,8 @@ def flow_bound(
         + ", counting loop closures with the poses of the map, not those among its own new poses; by flows in layers of "
         f"{100 * delta:.3g} cm"
     )
-    return FlowBound(prior, criterion, rewards, vertices, max_length, covers)
+    every = np.arange(len(layers.arcs.source), dtype=np.int32)
+    return FlowBound(prior, criterion, rewards, rewards.background(), vertices, max_length, whole - max_length, covers, every)
 
 
 def _cells(ways: Ways, delta: float, size: float, most: int) -> Int32Array:

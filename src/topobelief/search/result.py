@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from topobelief.arrays import FloatArray, ReadOnlyArrays, frozen_floats
 from topobelief.graph.action import Action
 from topobelief.search.front import spread_on_front
@@ -53,6 +55,9 @@ class SearchResult(ReadOnlyArrays):
         The best way found at each length, by increasing length and decreasing objective.
     front : shape (F, 2)
         Metres and objective of the ways on the front, cost excluded: what each further metre buys. `cost_per_metre` picks one.
+    front_bounds : shape (G, 2)
+        Metres and a value: no walk of up to so many metres has a smaller objective, cost excluded. By increasing length and
+        decreasing value; between two of the lengths the value of the longer one holds. Empty where nothing is known.
     lower_bound : float
         No walk of the class has a smaller value, cost included; -inf where nothing is known.
     covers : str
@@ -82,6 +87,7 @@ class SearchResult(ReadOnlyArrays):
     alternatives: tuple[Way, ...]
     on_front: tuple[Way, ...]
     front: FloatArray
+    front_bounds: FloatArray
     lower_bound: float
     covers: str
     proven_optimal: bool
@@ -97,6 +103,7 @@ class SearchResult(ReadOnlyArrays):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "front", frozen_floats(self.front, name="front"))
+        object.__setattr__(self, "front_bounds", frozen_floats(self.front_bounds, name="front_bounds"))
 
     @property
     def path(self) -> FloatArray:
@@ -122,6 +129,11 @@ class SearchResult(ReadOnlyArrays):
     def gap(self) -> float:
         """No walk of the class is better than the best way by more than this; inf where nothing is known."""
         return max(0.0, self.value - self.lower_bound)
+
+    def bound_within(self, length: float) -> float:
+        """No walk of up to a length has a smaller objective, cost excluded; -inf where nothing is known."""
+        place = int(np.searchsorted(self.front_bounds[:, 0], length))
+        return float(self.front_bounds[place, 1]) if place < len(self.front_bounds) else -math.inf
 
     @property
     def unit(self) -> str:
