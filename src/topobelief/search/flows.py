@@ -89,7 +89,6 @@ class FlowBound:
         records = used_records(layers.arcs, arcs, len(layers.records.number))
         whole = _Part(arcs, records, by_layer=self._by_layer)
         self._open: list[tuple[float, int, _Part]] = [(-math.inf, next(self._counter), whole)]
-        self._begin, self._end = rewards.places()
         self._slow_steps = _SLOW_STEPS[layers.num_labels > 1]
         self._arcs = arcs
         ends = rewards.delta * (np.arange(layers.num_layers) + 2.0) - lead_in
@@ -188,7 +187,10 @@ class FlowBound:
         layers = rewards.layers
         plan = self._mixture(part)
         gain, slopes = gain_and_slopes(self._prior, criterion.kind, plan)
-        offset = sum(w * slopes.of(c.plan) for w, c in zip(part.weights.tolist(), part.courses, strict=True))
+        if part.courses:
+            offset = sum(w * slopes.of(c.plan) for w, c in zip(part.weights.tolist(), part.courses, strict=True))
+        else:
+            offset = slopes.of_background(self._background)
         priced = bool(rewards.prices.any()) or criterion.counts_poses
         rate = criterion.least_rate(gain, part.ahead) if priced else 1.0
         worth = rewards.of_records(slopes, part.records)
@@ -332,12 +334,13 @@ class FlowBound:
         if count is None or (line is not None and line[0] >= count[0]):
             assert line is not None
             _, number, normal, at = line
-            is_it = layers.records.number == number
-            one, other = self._begin @ normal, self._end @ normal
-            kept = [
-                allowed_arcs(layers.arcs, part.arcs, ~is_it | side)
-                for side in (np.minimum(one, other) <= at, np.maximum(one, other) >= at)
-            ]
+            which = part.records[layers.records.number[part.records] == number]
+            one, other = (ends @ normal for ends in self._rewards.places(which))
+            kept: list[Int32Array] = []
+            for side in (np.minimum(one, other) <= at, np.maximum(one, other) >= at):
+                allowed = np.ones(len(layers.records.number), dtype=bool)
+                allowed[which[~side]] = False
+                kept.append(allowed_arcs(layers.arcs, part.arcs, allowed))
         else:
             last = layers.arcs.last[part.arcs]
             kept = [part.arcs[(last < 0) | (last <= count[1])], part.arcs[(last < 0) | (last > count[1])]]
@@ -357,16 +360,16 @@ class FlowBound:
     def _dividing_line(self, part: _Part, shares: FloatArray) -> tuple[float, int, FloatArray, float] | None:
         """Score, number of a new pose, unit vector, and where along it to cut."""
         records = self._rewards.layers.records
-        middle = (self._begin + self._end) / 2
         best: tuple[float, int, FloatArray, float] | None = None
         numbers = [records.number[course.records] for course in part.courses]
+        middles = [np.mean(self._rewards.places(course.records), axis=0) for course in part.courses]
         for t in range(1, self._rewards.num_new + 1):
             places: list[FloatArray] = []
             weights: list[float] = []
-            for course, number, weight in zip(part.courses, numbers, shares.tolist(), strict=True):
+            for middle, number, weight in zip(middles, numbers, shares.tolist(), strict=True):
                 at = np.flatnonzero(number == t)
                 if at.size and weight > _LEAST_WEIGHT:
-                    places.append(middle[course.records[at[0]]])
+                    places.append(middle[at[0]])
                     weights.append(weight)
             if len(places) < 2:
                 continue
