@@ -66,7 +66,10 @@ def certificate(result: SearchResult) -> list[str]:
     if math.isinf(result.lower_bound):
         return [work, "Nothing is proven of other ways."]
     bound = said(result.lower_bound, result.objective)
-    return [work, f"No walk has less than {bound}: {result.covers}."]
+    told = [work, f"No walk has less than {bound}: {result.covers}."]
+    if result.own_closures_gain > 0:
+        told.append(f"Those among the poses of the best way gain {said(result.own_closures_gain, result.objective)}.")
+    return told
 
 
 _REASONS = {

@@ -83,6 +83,16 @@ class Evaluations:
             probabilities=action.probabilities,
         )
 
+    def value_with_map_alone(self, walk: Walk) -> float:
+        """Of a walk if the loops that its own poses close with each other were not closed, cost included."""
+        action, num_poses = self.action(walk), self._planner.graph.num_poses
+        inner, apart = action.edges.min(axis=1) >= num_poses, np.abs(np.diff(action.edges, axis=1)[:, 0])
+        kept = ~(inner & (apart > 1))  # odometry joins a pose to the one before
+        if kept.all():
+            return self.value(walk)
+        without = Action(action.poses, action.edges[kept], action.information[kept], length=action.length)
+        return float(self._planner.entropies([without])[0]) + action.cost
+
     def arrays(self) -> tuple[list[Walk], FloatArray, FloatArray]:
         """All walks evaluated so far, their lengths (metres) and values, in the order of their evaluation."""
         walks, lengths = list(self.objectives), np.array([*self.lengths.values()])[: len(self.objectives)]

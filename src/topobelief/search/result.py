@@ -62,6 +62,9 @@ class SearchResult(ReadOnlyArrays):
         No walk of the class has a smaller value, cost included; -inf where nothing is known.
     covers : str
         Which walks the lower bound covers, and which bound it is; empty where there is none.
+    value_with_map_alone : float
+        Value of the best way if loop closures among its own new poses did not count, as the lower bound has it; at least
+        `value`.
     proven_optimal : bool
         Whether the lower bound meets the value, to rounding or to the gap that was asked for as 0.
     value_now : float
@@ -90,6 +93,7 @@ class SearchResult(ReadOnlyArrays):
     front_bounds: FloatArray
     lower_bound: float
     covers: str
+    value_with_map_alone: float
     proven_optimal: bool
     value_now: float
     shortest: Way | None
@@ -134,6 +138,11 @@ class SearchResult(ReadOnlyArrays):
         """No walk of up to a length has a smaller objective, cost excluded; -inf where nothing is known."""
         place = int(np.searchsorted(self.front_bounds[:, 0], length))
         return float(self.front_bounds[place, 1]) if place < len(self.front_bounds) else -math.inf
+
+    @property
+    def own_closures_gain(self) -> float:
+        """By how much the loops that the best way closes with itself better its value; the certificate does not count such."""
+        return max(0.0, self.value_with_map_alone - self.value)
 
     @property
     def unit(self) -> str:

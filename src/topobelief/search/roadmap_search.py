@@ -206,6 +206,7 @@ def search_roadmap(
         front_bounds=below_front(search.front_bounds, lengths[front], objectives[front]),
         lower_bound=search.lower_bound,
         covers=search.covers,
+        value_with_map_alone=evaluations.value_with_map_alone(best),
         proven_optimal=search.proven,
         value_now=value_now,
         shortest=None if goal is None else way(walks.walk(())),
