@@ -68,15 +68,26 @@ def rgb(colour: str) -> list[float]:
     return [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
 
 
-@pytest.mark.parametrize("share", [0.9, 0.2, -math.inf])
-def test_the_front_is_drawn_on_the_axes_given_with_its_bound(scene, share):
+@pytest.mark.parametrize("share", [0.9, 0.2])
+def test_the_front_is_drawn_on_the_axes_given_with_its_bounds(scene, share):
+    """Bounds far below the front are told in words, with as much of the line as the picture has room for."""
     _, found = scene
     ax = Figure().add_subplot()
-    bounded = replace(found, lower_bound=share * found.value)
-    assert tb.draw_front(bounded, ax) is ax
-    steps = ax.lines[0].get_xydata()
-    np.testing.assert_allclose(steps[:-1], found.front * (1, 100))
-    lines = [line for line in ax.lines if len(line.get_xydata()) == 2 and np.ptp(line.get_ydata()) == 0]
-    said = [text.get_text() for text in ax.texts]
-    assert bool(lines) + any("no walk is below" in text for text in said) >= (share > 0)
-    assert share != -math.inf or not said
+    bounds = np.array([[found.front[0, 0], share * found.front[0, 1]], [found.max_length, share * found.front[-1, 1]]])
+    assert tb.draw_front(replace(found, front_bounds=bounds), ax) is ax
+    np.testing.assert_allclose(ax.lines[0].get_xydata()[:-1], found.front * (1, 100))
+    np.testing.assert_allclose(ax.lines[1].get_xydata()[1:], bounds * (1, 100))
+    assert bool(ax.texts) == (ax.get_ylim()[0] > 100 * bounds[-1, 1])
+    assert tb.draw_front(found, Figure().add_subplot()).lines[1].get_label() == "chosen"
+
+
+def test_the_bound_of_each_length_is_told_beside_the_front(scene):
+    _, found = scene
+    assert "none below" not in text_of(front_table(found, 3))
+    middle, least = float(found.front[:2, 0].mean()), 0.5 * found.front[-1, 1]
+    bounded = replace(found, front_bounds=np.array([[middle, 2 * least], [found.max_length, least]]))
+    assert [bounded.bound_within(length) for length in (middle, middle + 1e-6)] == [2 * least, least]
+    assert bounded.bound_within(2 * found.max_length) == -math.inf
+    told = front_rows(bounded, 3)
+    assert [row[3] for row in (told[0], told[-1])] == [f"{100 * bound:#.3g} cm" for bound in (2 * least, least)]
+    assert "none below" in text_of(front_table(bounded, 3))

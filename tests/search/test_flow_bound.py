@@ -10,6 +10,7 @@ import topobelief as tb
 from roadmap_walks import Case, random_case
 from topobelief.search.flow_bound import flow_bound
 from topobelief.search.flows import FlowBound
+from topobelief.search.front_bounds import FrontBounds
 
 OBJECTIVES = ("error", "map", "joint", "per_pose")
 WITH_WALKS = (4, 8, 17, 62, 85, 96, 106, 111)  # of cases with 15 to 70 walks
@@ -157,3 +158,35 @@ def test_says_what_is_wrong():
         flow_bound(case.graph, case.roadmap, objective="map", **case.arguments() | {"cost_per_metre": -1.0})
     with pytest.raises(tb.TopobeliefError, match="expected edge_costs of at least 0 for each of"):
         flow_bound(case.graph, case.roadmap, objective="map", edge_costs=[1.0], **case.arguments())
+
+
+@pytest.mark.parametrize("objective", OBJECTIVES)
+@pytest.mark.parametrize("seed", WITH_WALKS)
+def test_no_walk_of_any_length_is_below_the_bound_for_it(seed, objective):
+    """All walks are enumerated; costs are not counted. The bounds fall as lengths grow, and end at that of the whole."""
+    case = random_case(seed)
+    walks = case.walks()
+    lengths = np.array([case.length(walk) for walk in walks])
+    values = case.values(objective, walks) - case.cost_per_metre * lengths
+    whole = flow_bound(case.graph, case.roadmap, objective=objective, **case.arguments())
+    front = FrontBounds(whole, float(lengths.min()), case.max_length)
+    known = iter((math.inf, *np.sort(values)[::-1].tolist()))
+
+    def best_within(length):
+        """Nothing at first, then worse and better walks."""
+        within = values[lengths <= length + 1e-9]
+        return max(next(known, -math.inf), within.min(initial=math.inf))
+
+    for turn in range(30):
+        if turn % 3 == 0:
+            whole.step()
+        if not front.finished:
+            front.step(best_within)
+        metres, bounds = front.curve().T
+        assert (np.diff(metres) > 0).all()
+        assert (np.diff(bounds) < 0).all()
+        place = np.searchsorted(metres, lengths)
+        below = np.append(bounds, -math.inf)[place]
+        assert (below <= values + 1e-9 * np.maximum(1, np.abs(values))).all()
+    if not case.cost_per_metre:
+        assert bounds[-1] >= whole.lower_bound

@@ -11,13 +11,13 @@ from roadmap_walks import map_error, plan_of, random_case
 from topobelief.search.criteria import Criterion
 from topobelief.search.information_gain import gain, gain_and_slopes
 from topobelief.search.plans import Background, Mixture, Plan
-from topobelief.search.reduced_prior import ReducedPrior, reduced_prior
+from topobelief.search.reduced_prior import ReducedPrior
 
 KINDS = ("map", "joint", "error")
 
 
 def _prior(case, seen) -> ReducedPrior:
-    return reduced_prior(
+    return ReducedPrior(
         case.graph,
         case.graph.num_poses - 1,
         seen,

@@ -309,3 +309,17 @@ def test_a_search_stops_after_so_many_evaluations_or_when_nothing_more_than_enou
     for wrong in ({"enough": -1.0}, {"max_evaluations": 0}):
         with pytest.raises(InvalidInputError, match=next(iter(wrong))):
             search(graph, roadmap, **options, **wrong)
+
+
+def test_what_closures_among_the_own_poses_of_a_way_gain_is_told():
+    """There and back: poses on the way back may see those on the way out. The value without them is that of the planner."""
+    graph, roadmap = scene(3)
+    closures = tb.ClosureModel(radius=1.5, max_per_pose=3, probability=1.0, min_index_gap=3)
+    result = search(graph, roadmap, max_length=8.0, return_to_start=True, closures=closures)
+    own = (result.action.edges >= graph.num_poses).all(axis=1) & (np.arange(len(result.action.edges)) >= len(result.action.poses))
+    assert own.any()
+    kept = tb.Action(result.action.poses, result.action.edges[~own], result.action.information[~own])
+    assert result.value_with_map_alone == pytest.approx(tb.Planner(graph, objective="map").entropies([kept])[0], rel=1e-9)
+    assert result.own_closures_gain > 1e-3
+    without = search(graph, roadmap, goal=roadmap.vertices[1], max_detour=1.0)
+    assert without.own_closures_gain == 0.0

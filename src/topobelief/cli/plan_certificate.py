@@ -71,7 +71,9 @@ def certificate(searched: Searched, limits: Limits) -> str:
     where = to if searched.has_goal else " back to the start" if limits.return_to_start else ""
     longest = "" if searched.num_searches > 1 else f", up to {found.max_length:.1f} m,"
     walks = f"walk of the roadmap{where}{longest}"
-    about = "(That counts loop closures with the map, not those that a walk closes with itself.)"
+    own = quantity(found.own_closures_gain, found.unit) if found.own_closures_gain > 0 else ""
+    here = f"those of this one gain {own}" if own else "this one has none"
+    about = f"(That counts loop closures with the map, not those that a walk closes with itself; {here}.)"
     if found.proven_optimal and bound >= found.lower_bound:
         return f"Proven: no {walks} is better. {about}"
     cost = ", the cost of its metres included" if found.cost_per_metre else ""
@@ -118,11 +120,13 @@ def document(searched: Searched, limits: Limits) -> dict[str, object]:
         "value_now": found.value_now,
         "lower_bound": finite(searched.lower_bound),
         "gap": finite(found.value - searched.lower_bound),
+        "value_with_map_alone": found.value_with_map_alone,
         "proven_optimal": found.proven_optimal and searched.lower_bound >= found.lower_bound,
         "covers": found.covers,
         "max_length": found.max_length,
         "sees_map": found.sees_map,
         "front": found.front.tolist(),
+        "front_bounds": found.front_bounds.tolist(),
         "stopped_by": found.stopped_by,
         "num_evaluations": found.num_evaluations,
         "enough": None if limits.enough is None else verdict(found, limits.enough),

@@ -74,7 +74,7 @@ def draw_search(
 
 
 def draw_front(result: SearchResult, ax: Any) -> Any:
-    """What each further metre buys, the way chosen, and below which value no walk can be.
+    """What each further metre buys, the way chosen, and below which value no walk of each length can be.
 
     Parameters
     ----------
@@ -92,8 +92,8 @@ def draw_front(result: SearchResult, ax: Any) -> Any:
     last = max(result.max_length, float(lengths[-1]))
     x, y = np.r_[lengths, last], scale * np.r_[values, values[-1]]
     ax.step(x, y, where="post", color=style.SURVIVOR, linewidth=1.4, label="best way found", zorder=4)
-    if not math.isinf(result.lower_bound) and result.cost_per_metre == 0:
-        _draw_bound(ax, x, y, scale * result.lower_bound)
+    if len(result.front_bounds):
+        _draw_bounds(ax, x, y, result.front_bounds * [1.0, scale])
     chosen = scale * (result.value - result.best.action.cost)
     ax.plot([result.length], [chosen], "o", color=style.BEST, markeredgecolor="white", markersize=7, zorder=6, label="chosen")
     if result.shortest is not None:
@@ -108,18 +108,22 @@ def draw_front(result: SearchResult, ax: Any) -> Any:
     return ax
 
 
-def _draw_bound(ax: Any, x: FloatArray, y: FloatArray, bound: float) -> None:
-    """The line below which no walk is, or where it is too far down to be shown, a word of it."""
+def _draw_bounds(ax: Any, x: FloatArray, y: FloatArray, bounds: FloatArray) -> None:
+    """The line below which no walk is; where it is too far down to be shown, a word of it."""
     span = float(y[0] - y[-1]) or 1.0
-    where, look = "data", {"textcoords": "offset points", "fontsize": 7, "color": style.MUTED}
-    text, at = "no walk is below", bound
-    if y[-1] - bound > _FURTHEST * span:
-        text, at = f"no walk is below {bound:.4g}", y[-1] - 0.25 * span
-        ax.set_ylim(at, y[0] + 0.15 * span)
-    else:
-        ax.plot([x[0], x[-1]], [bound, bound], color=style.INK, linewidth=1.0, linestyle=(0, (4, 2)), zorder=3)
-    ax.fill_between(x, y, at, step="post", color=style.GRID, alpha=0.5, linewidth=0, zorder=1)
-    ax.annotate(text, (x[0], at), xycoords=where, xytext=(3, 3), **look)
+    metres, lowest = bounds.T
+    floor = y[-1] - 1.15 * _FURTHEST * span
+    if lowest.min() < floor:
+        ax.set_ylim(floor, y[0] + 0.15 * span)
+        at = (metres[-1], floor)
+        look: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "color": style.MUTED, "ha": "right"}
+        ax.annotate(f"no walk is below {lowest.min():.4g}", at, xycoords="data", xytext=(-2, 3), **look)
+    line: dict[str, Any] = {"color": style.INK, "linewidth": 1.0, "linestyle": (0, (4, 2)), "zorder": 3}
+    ax.step(np.r_[x[0], metres], np.r_[lowest[0], lowest], where="pre", label="no walk is below", **line)
+    grid = np.unique(np.r_[x, metres[(metres > x[0]) & (metres < x[-1])]])
+    best = y[np.searchsorted(x, grid, side="right") - 1]
+    least = np.append(lowest, lowest[-1])[np.searchsorted(metres, grid, side="right")]
+    ax.fill_between(grid, best, np.minimum(least, best), step="post", color=style.GRID, alpha=0.5, linewidth=0, zorder=1)
 
 
 def _draw_ways(panel: Panel, result: SearchResult, others: list[FloatArray]) -> list[Entry]:

@@ -12,7 +12,9 @@ from topobelief.search.result import SearchResult, Way, said
 
 
 def front_rows(result: SearchResult, count: int = 5, *, names: Mapping[int, str] | None = None) -> list[tuple[str, ...]]:
-    """Some ways of the front: length, loop closures, objective without cost, and what of the gain of the longest it has.
+    """Some ways of the front: length, closures, objective without cost, its bound, and what of the gain of the longest it has.
+
+    The bound is that of all walks which are no longer; where nothing is known of any of them there is no such cell.
 
     Parameters
     ----------
@@ -31,6 +33,7 @@ def front_rows(result: SearchResult, count: int = 5, *, names: Mapping[int, str]
             f"{way.length:.1f} m",
             _closures(way),
             said(_objective(way), result.objective),
+            *((_bound(result, way),) if len(result.front_bounds) else ()),
             f"{100 * (result.value_now - _objective(way)) / most:.0f} %" if most > 0 else "–",
         )
         for place, way in zip(places, ways, strict=True)
@@ -39,7 +42,7 @@ def front_rows(result: SearchResult, count: int = 5, *, names: Mapping[int, str]
 
 def front_table(result: SearchResult, count: int = 5, *, names: Mapping[int, str] | None = None) -> Table:
     """Some ways of the front, shortest first; names as for `front_rows`."""
-    columns = ("way", "closures", "after it", "of the gain")
+    columns = ("way", "closures", "after it", *(("none below",) if len(result.front_bounds) else ()), "of the gain")
     table = _table("what each further metre buys", columns if names is None else ("", *columns))
     for row in front_rows(result, count, names=names):
         table.add_row(*row)
@@ -63,7 +66,10 @@ def certificate(result: SearchResult) -> list[str]:
     if math.isinf(result.lower_bound):
         return [work, "Nothing is proven of other ways."]
     bound = said(result.lower_bound, result.objective)
-    return [work, f"No walk has less than {bound}: {result.covers}."]
+    told = [work, f"No walk has less than {bound}: {result.covers}."]
+    if result.own_closures_gain > 0:
+        told.append(f"Those among the poses of the best way gain {said(result.own_closures_gain, result.objective)}.")
+    return told
 
 
 _REASONS = {
@@ -80,6 +86,11 @@ _REASONS = {
 def _closures(way: Way) -> str:
     """How many loops are expected to be closed."""
     return f"{way.action.expected_closures:.3g}"
+
+
+def _bound(result: SearchResult, way: Way) -> str:
+    bound = result.bound_within(way.length)
+    return "–" if math.isinf(bound) else said(bound, result.objective)
 
 
 def _objective(way: Way) -> float:

@@ -7,8 +7,12 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Literal, NamedTuple
 
+import numpy as np
+
+from topobelief.arrays import FloatArray, IntArray
 from topobelief.search.bound import WalkBound
 from topobelief.search.evaluations import SAME_VALUE, Evaluations
+from topobelief.search.front_bounds import FrontBounds
 from topobelief.search.local_search import LocalSearch
 from topobelief.search.walks import Walk
 
@@ -22,6 +26,8 @@ _PATIENCE = 1000  # evaluations without improvement after which local search res
 _MOST_RESTARTS = 20  # without improvement, likewise
 _STEPS_PER_LOOK = 20  # of the bound, in which it closes at least
 _LEAST_PROGRESS = 0.05  # this share of the gap, or rests; with a deadline it goes on
+_STEPS_PER_FRONT_STEP = 3  # of the bound for one of the bounds of shorter walks
+_ONE_AS_LONG_AS = 3  # steps of a kind: the longest of so many says how long the next may take
 
 
 class SearchProgress(NamedTuple):
@@ -40,8 +46,8 @@ class AnytimeSearch:
     ----------
     evaluations, local
         Local search evaluates its walks there.
-    make_bound
-        Called once, when local search has found first values; None: search without a bound.
+    make_bounds
+        Called once, when local search has found first values: the bound, and those of shorter walks. None: search without.
     began, deadline
         Seconds: on the monotonic clock, and from then on; None for no deadline.
     gap
@@ -57,7 +63,7 @@ class AnytimeSearch:
         self,
         evaluations: Evaluations,
         local: LocalSearch,
-        make_bound: Callable[[], WalkBound] | None,
+        make_bounds: Callable[[], tuple[WalkBound, FrontBounds]] | None,
         *,
         began: float,
         deadline: float | None,
@@ -66,12 +72,15 @@ class AnytimeSearch:
         max_evaluations: int | None = None,
         on_progress: Callable[[SearchProgress], None] | None,
     ) -> None:
-        self._evaluations, self._local, self._make_bound = evaluations, local, make_bound
+        self._evaluations, self._local, self._make_bounds = evaluations, local, make_bounds
         self._began, self._gap, self._enough, self._on_progress = began, gap, enough, on_progress
         self._end = math.inf if deadline is None else began + deadline
         self._warm = math.inf if deadline is None else began + _WARM_UP_SHARE * deadline
         self._most = math.inf if max_evaluations is None else max_evaluations
         self._bound: WalkBound | None = None
+        self._front: FrontBounds | None = None
+        self._took: dict[str, list[float]] = {"whole": [], "front": []}  # seconds, by step of each kind
+        self._no_time = False  # for one more step of the bound
         self._best = math.inf
         self._at_best = 0  # evaluations made when the best value was found
         self._restarts = 0  # of local search, since then
@@ -88,6 +97,11 @@ class AnytimeSearch:
         return "" if self._bound is None else self._bound.covers
 
     @property
+    def front_bounds(self) -> FloatArray:
+        """Metres, and the least objective without cost that walks of up to so many metres can have, shape (G, 2)."""
+        return np.zeros((0, 2)) if self._front is None else self._front.curve()
+
+    @property
     def proven(self) -> bool:
         """Whether no walk can be better, to rounding."""
         return self._best - self.lower_bound <= SAME_VALUE * abs(self._best)
@@ -99,6 +113,7 @@ class AnytimeSearch:
             while True:
                 self._note()
                 if self.proven:
+                    self._bound_front()
                     return "proof"
                 if self._best - self.lower_bound <= self._gap:
                     return "gap"
@@ -112,7 +127,8 @@ class AnytimeSearch:
                 if self._is_warm or not moved:
                     moved |= self._bound_on()
                 if not moved:
-                    return "rest"
+                    self._bound_front()
+                    return "deadline" if self._no_time else "rest"
         except KeyboardInterrupt:
             if len(self._evaluations) == 0:
                 raise
@@ -138,17 +154,41 @@ class AnytimeSearch:
 
     def _bound_on(self) -> bool:
         """One step of the bound; whether it may still make progress."""
-        if self._make_bound is None:
+        if self._make_bounds is None:
             return False
-        if self._bound is None:
-            self._bound = self._make_bound()
+        if self._bound is None or self._front is None:
+            self._bound, self._front = self._make_bounds()
         if self._bound.finished or self._bound_rests:
             return False
+        if not self._has_time_for("whole"):
+            self._no_time = True
+            return False
         self._bound.prune(self._best)
-        walks = self._bound.step()
+        self._take(self._bound.step, "whole")
         self._bounds.append(self._bound.lower_bound)
-        self._local.seed([tuple(walk.tolist()) for walk in walks])
+        if len(self._bounds) % _STEPS_PER_FRONT_STEP == 0 and not self._front.finished and self._has_time_for("front"):
+            self._step_front(self._front)
         return True
+
+    def _bound_front(self) -> None:
+        """All steps that the bounds of shorter walks are to have, as far as there is time."""
+        while self._front is not None and not self._front.finished and self._has_time_for("front"):
+            self._step_front(self._front)
+
+    def _step_front(self, front: FrontBounds) -> None:
+        self._take(lambda: front.step(self._evaluations.best_within), "front")
+
+    def _take(self, step: Callable[[], list[IntArray]], kind: str) -> None:
+        """One step of a kind; its walks are for local search."""
+        began = time.monotonic()
+        walks = step()
+        self._took[kind].append(time.monotonic() - began)
+        self._local.seed([tuple(walk.tolist()) for walk in walks])
+
+    def _has_time_for(self, kind: str) -> bool:
+        """Whether one more step of a kind would end before the deadline, if it takes as long as the last ones."""
+        latest = self._took[kind][-_ONE_AS_LONG_AS:] or self._took["whole"][-_ONE_AS_LONG_AS:]
+        return time.monotonic() + max(latest, default=0.0) <= self._end
 
     @property
     def _bound_rests(self) -> bool:

@@ -100,7 +100,7 @@ class Criterion:
 
     def compared_with(self, reference: float) -> Criterion:
         """The same with another reference; only "per_pose" has one."""
-        return replace(self, reference=reference) if self.is_ratio else self
+        return replace(self, reference=reference) if self.is_ratio and math.isfinite(reference) else self
 
     def at_end(self) -> FloatArray:
         """What is linear in the plan, costs aside, by the number of a walk's new poses, shape (T + 1,)."""
@@ -121,13 +121,15 @@ class Criterion:
         """How much the rest falls with the gain."""
         return 0.5 / math.sqrt(max(self.start - gain, 1e-30 * self.start)) if self.kind == "error" else 1.0
 
-    def least(self, gain: float, ahead: float) -> float:
+    def least(self, gain: float, ahead: FloatArray) -> FloatArray:
         """Lower bound of the rest where the linear function is D = `ahead` above the gain; convex and falling in D."""
-        if self.kind == "error":
-            left = max(self.start - gain, 0.0)
-            return math.inf if left + ahead <= 0 else math.sqrt(left / (1 + ahead / left)) if left else 0.0
-        share = 1 + 2 * ahead / self.size
-        return math.inf if share <= 0 else self.start - gain - self.size / 2 * math.log(share)
+        left = max(self.start - gain, 0.0) if self.kind == "error" else 0.5 * self.size
+        if left == 0:
+            return np.zeros(len(ahead))
+        share = 1 + ahead / left
+        some = np.maximum(share, np.finfo(float).tiny)
+        value = np.sqrt(left / some) if self.kind == "error" else self.start - gain - left * np.log(some)
+        return np.where(share <= 0, math.inf, value)
 
     def least_rate(self, gain: float, ahead: float) -> float:
         """How fast that falls with D."""
@@ -143,12 +145,11 @@ class Criterion:
             return math.inf if value <= 0 else left * (left / value**2 - 1)
         return self.size / 2 * (math.exp(min(2 * (self.start - gain - value) / self.size, 500.0)) - 1)
 
-    def to_objective(self, value: float) -> float:
+    def to_objective(self, value: FloatArray) -> FloatArray:
         """Lower bound of the objective from one of what is minimised."""
         if not self.is_ratio:
             return value
-        poses = self.free_poses + (self.fewest if value < 0 else self.num_new)
-        return self.reference + value / poses
+        return self.reference + value / (self.free_poses + np.where(value < 0, self.fewest, self.num_new))
 
     def from_objective(self, value: float) -> float:
         """What is minimised is at least this for every walk whose objective is at least `value`, and below for better ones."""

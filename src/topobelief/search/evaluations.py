@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
@@ -18,6 +19,7 @@ Predict = Callable[[list[FloatArray]], list[Action]]
 
 SAME_VALUE = 1e-9  # relative: values that differ by less are equal
 _NUM_LANDMARKS = 16
+_ROUNDING = 1e-9  # relative: lengths that differ by less are equal
 
 
 class Evaluations:
@@ -81,6 +83,16 @@ class Evaluations:
             probabilities=action.probabilities,
         )
 
+    def value_with_map_alone(self, walk: Walk) -> float:
+        """Of a walk if the loops that its own poses close with each other were not closed, cost included."""
+        action, num_poses = self.action(walk), self._planner.graph.num_poses
+        inner, apart = action.edges.min(axis=1) >= num_poses, np.abs(np.diff(action.edges, axis=1)[:, 0])
+        kept = ~(inner & (apart > 1))  # odometry joins a pose to the one before
+        if kept.all():
+            return self.value(walk)
+        without = Action(action.poses, action.edges[kept], action.information[kept], length=action.length)
+        return float(self._planner.entropies([without])[0]) + action.cost
+
     def arrays(self) -> tuple[list[Walk], FloatArray, FloatArray]:
         """All walks evaluated so far, their lengths (metres) and values, in the order of their evaluation."""
         walks, lengths = list(self.objectives), np.array([*self.lengths.values()])[: len(self.objectives)]
@@ -92,6 +104,11 @@ class Evaluations:
         least = values.min()
         equal = np.flatnonzero(values <= least + SAME_VALUE * max(1e-3, abs(least)))
         return walks[equal[np.lexsort((values[equal], lengths[equal]))[0]]]
+
+    def best_within(self, length: float) -> float:
+        """The least objective of the walks of up to a length, cost excluded; inf where there is none."""
+        values = [self.objectives[walk] for walk, metres in self.lengths.items() if metres <= length * (1 + _ROUNDING)]
+        return min(values, default=math.inf)
 
     def different(self, order: Iterable[int], count: int, apart: float) -> list[Walk]:
         """The first `count` walks of an order that are more than a distance from each other (Fréchet, metres)."""

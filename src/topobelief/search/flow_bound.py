@@ -15,7 +15,7 @@ from topobelief.linalg.block_cholesky import Int32Array
 from topobelief.search.criteria import Criterion
 from topobelief.search.flows import FlowBound
 from topobelief.search.layers import build_layers
-from topobelief.search.reduced_prior import reduced_prior
+from topobelief.search.reduced_prior import ReducedPrior
 from topobelief.search.rewards import Rewards, odometry_powers
 from topobelief.search.ways import Ways, cells_of_pieces, find_sightings, first_pieces
 from topobelief.world import World
@@ -152,7 +152,7 @@ def flow_bound(
     num_new = max(1, int(layers.records.number.max(initial=1)))
     sightings = find_sightings(graph, ways, pose, delta, closures, world, num_new)
     seen = sightings.seen if len(sightings.seen) else np.array([pose])
-    prior = reduced_prior(
+    prior = ReducedPrior(
         graph,
         pose,
         seen,
@@ -173,7 +173,8 @@ def flow_bound(
         + ", counting loop closures with the poses of the map, not those among its own new poses; by flows in layers of "
         f"{100 * delta:.3g} cm"
     )
-    return FlowBound(prior, criterion, rewards, vertices, max_length, covers)
+    every = np.arange(len(layers.arcs.source), dtype=np.int32)
+    return FlowBound(prior, criterion, rewards, rewards.background(), vertices, max_length, whole - max_length, covers, every)
 
 
 def _cells(ways: Ways, delta: float, size: float, most: int) -> Int32Array:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import heapq
 import itertools
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -22,14 +22,15 @@ from topobelief.linalg.block_cholesky import Int32Array
 from topobelief.search.criteria import Criterion
 from topobelief.search.cuts import best_line, best_place
 from topobelief.search.information_gain import gain_and_slopes
-from topobelief.search.longest_paths import arcs_above, longest_path
-from topobelief.search.plans import Mixture
+from topobelief.search.longest_paths import arcs_above, arcs_to_ends, longest_path
+from topobelief.search.plans import Background, Mixture
 from topobelief.search.reduced_prior import ReducedPrior
 from topobelief.search.rewards import Course, Rewards, allowed_arcs, used_records
 from topobelief.search.weights import best_weights
 
 _SAME_PLACE = 1e-9  # metres
 _ROUNDING = 1e-9  # relative; bounds are lowered by it
+_TIE = 1e-6  # of a layer: lengths that differ by less are equal
 _BACKGROUND = 1e-5  # share of the background in each flow: it is counted as if walks had it, which lowers bounds by as little
 _LARGEST_SET = 40  # walks whose weights are optimised
 _TOLL_TRIALS = 2  # longest paths a step, to find the price of a metre
@@ -49,7 +50,7 @@ class _Part:
     records: Int32Array  # of the arcs, each once
     courses: list[Course] = field(default_factory=list["Course"])
     weights: FloatArray = field(default_factory=lambda: np.zeros(0))
-    bound: float = -math.inf
+    by_layer: FloatArray = field(default_factory=lambda: np.zeros(0))  # bound of the walks that end up to each layer
     toll: float = 0.0
     ahead: float = 0.0  # D at the longest path
     steps: int = 0
@@ -57,32 +58,73 @@ class _Part:
     slow: int = 0  # latest steps in a row that hardly raised the bound
     is_ready: bool = False  # to be split
 
+    @property
+    def bound(self) -> float:
+        """Of all its walks."""
+        return float(self.by_layer[-1])
+
 
 class FlowBound:
     """Lower bound of the objective over the walks of a roadmap; see `WalkBound` and `flow_bound`."""
 
     def __init__(
-        self, prior: ReducedPrior, criterion: Criterion, rewards: Rewards, vertices: IntArray, max_length: float, covers: str
+        self,
+        prior: ReducedPrior,
+        criterion: Criterion,
+        rewards: Rewards,
+        background: Background,
+        vertices: IntArray,
+        max_length: float,
+        lead_in: float,
+        covers: str,
+        arcs: Int32Array,
     ) -> None:
-        self._prior, self._criterion, self._rewards = prior, criterion, rewards
-        self._vertices, self._max_length, self._covers = vertices, max_length, covers
+        self._prior, self._criterion, self._rewards, self._background = prior, criterion, rewards, background
+        self._vertices, self._max_length, self._lead_in, self._covers = vertices, max_length, lead_in, covers
         self._best = math.inf
-        self._closed = math.inf  # least bound of the parts that cannot be split
-        self._bound = -math.inf
+        layers = rewards.layers
+        self._closed = np.full(layers.num_layers, math.inf)  # least bounds of the parts that cannot be split
+        self._by_layer = np.full(layers.num_layers, -math.inf)
         self._counter = itertools.count()
-        arcs = rewards.layers.arcs
-        every = np.arange(len(arcs.source), dtype=np.int32)
-        whole = _Part(every, used_records(arcs, every, len(rewards.layers.records.number)))
+        records = used_records(layers.arcs, arcs, len(layers.records.number))
+        whole = _Part(arcs, records, by_layer=self._by_layer)
         self._open: list[tuple[float, int, _Part]] = [(-math.inf, next(self._counter), whole)]
-        self._begin, self._end = rewards.places()
-        self._background = rewards.background()
-        self._slow_steps = _SLOW_STEPS[rewards.layers.num_labels > 1]
-        self._num_arcs = len(every)
+        self._slow_steps = _SLOW_STEPS[layers.num_labels > 1]
+        self._arcs = arcs
+        ends = rewards.delta * (np.arange(layers.num_layers) + 2.0) - lead_in
+        self._longest = np.minimum(ends, max_length)  # metres, of walks that end in each layer or in the next one
         self.num_steps = 0
+
+    def within(self, max_length: float) -> FlowBound:
+        """The bound of those walks that are no longer than a length, their costs not counted."""
+        layers, arcs = self._rewards.layers, self._rewards.layers.arcs
+        free = replace(self._rewards, prices=np.zeros(len(self._rewards.prices)))
+        number = arcs.source // layers.num_spots
+        ends_late = number + np.where(arcs.way < 0, 0, layers.whole_layers[arcs.way]) > self._last_layer(max_length)
+        which = np.flatnonzero((arcs.target >= 0) | ~ends_late).astype(np.int32)
+        which = arcs_to_ends(layers, which)
+        return FlowBound(
+            self._prior, self._criterion, free, self._background, self._vertices, max_length, self._lead_in, "", which
+        )
+
+    def _last_layer(self, length: float) -> int:
+        """The last layer in which walks of up to a length end."""
+        return int(np.floor((length + self._lead_in) / self._rewards.delta + _TIE))
 
     @property
     def lower_bound(self) -> float:
-        return self._bound
+        return float(self._by_layer[-1])
+
+    @property
+    def counts_costs(self) -> bool:
+        """Whether driving costs anything."""
+        return bool(self._rewards.prices.any())
+
+    def by_length(self) -> FloatArray:
+        """Metres and the least value that walks of up to so many metres can have, by increasing length, shape (layers, 2)."""
+        metres = self._rewards.delta * (np.arange(len(self._by_layer)) + 1.0 - 2 * _TIE) - self._lead_in
+        upto = self._last_layer(self._max_length) + 1
+        return np.column_stack([np.minimum(metres, self._max_length), self._by_layer])[:upto]
 
     @property
     def covers(self) -> str:
@@ -95,10 +137,10 @@ class FlowBound:
     @property
     def share_ruled_out(self) -> float:
         """Share of the layers' arcs that lie on no walk which may be better than the best one known."""
-        kept = np.zeros(self._num_arcs, dtype=bool)
+        kept = np.zeros(len(self._rewards.layers.arcs.source), dtype=bool)
         for _, _, part in self._open:
             kept[part.arcs] = True
-        return 1 - float(kept.mean()) if len(kept) else 0.0
+        return 1 - float(kept[self._arcs].mean()) if len(self._arcs) else 0.0
 
     @property
     def num_parts(self) -> int:
@@ -122,7 +164,7 @@ class FlowBound:
             if halves is not None:
                 parts = halves
             elif part.slow >= self._slow_steps + 3:
-                self._closed, parts = min(self._closed, part.bound), []
+                self._closed, parts = np.minimum(self._closed, part.by_layer), []
         found: list[IntArray] = []
         for each in parts:
             found.extend(self._improved(each))
@@ -135,10 +177,9 @@ class FlowBound:
         return found
 
     def _update(self) -> None:
-        least = min((entry[0] for entry in self._open), default=math.inf)
-        bound = min(least, self._best, self._closed)
-        if bound > self._bound and bound < math.inf:
-            self._bound = bound
+        least = np.minimum.reduce([self._closed, *(part.by_layer for _, _, part in self._open)])
+        if min(least[-1], self._best) < math.inf:
+            self._by_layer = np.maximum(self._by_layer, np.minimum(least, self._best))
 
     def _improved(self, part: _Part) -> list[IntArray]:
         """One step of Frank-Wolfe on a part: its bound, its walks, their weights."""
@@ -146,13 +187,17 @@ class FlowBound:
         layers = rewards.layers
         plan = self._mixture(part)
         gain, slopes = gain_and_slopes(self._prior, criterion.kind, plan)
-        offset = sum(w * slopes.of(c.plan) for w, c in zip(part.weights.tolist(), part.courses, strict=True))
+        if part.courses:
+            offset = sum(w * slopes.of(c.plan) for w, c in zip(part.weights.tolist(), part.courses, strict=True))
+        else:
+            offset = slopes.of_background(self._background)
         priced = bool(rewards.prices.any()) or criterion.counts_poses
         rate = criterion.least_rate(gain, part.ahead) if priced else 1.0
         worth = rewards.of_records(slopes, part.records)
         at_end = -criterion.at_end() / rate if priced else np.zeros(rewards.num_new + 1)
         price = criterion.price / rate if priced else 0.0
         best: tuple[float, FloatArray, float] | None = None  # D less linear terms, lengths ahead, toll
+        by_layer = np.full(layers.num_layers, math.inf)  # the same D, over the walks that end up to each layer
         found: list[Course] = []
         lines: list[tuple[float, float]] = []  # a path's worth without toll, and its length
         toll = part.toll
@@ -160,9 +205,10 @@ class FlowBound:
         for _ in range(_TOLL_TRIALS):
             longest = longest_path(layers, part.arcs, weights, toll * rewards.driven)
             if longest.value == -math.inf:
-                part.bound, part.arcs = math.inf, part.arcs[:0]
+                part.by_layer, part.arcs = np.full(layers.num_layers, math.inf), part.arcs[:0]
                 return []
             total = longest.value - offset + toll * self._max_length
+            by_layer = np.minimum(by_layer, np.maximum.accumulate(longest.by_layer + toll * self._longest) - offset)
             course = rewards.course(longest.arcs, slopes)
             if best is None or total < best[0]:
                 best = total, longest.ahead, toll
@@ -179,19 +225,21 @@ class FlowBound:
             ahead = part.ahead if part.steps else 0.0
             rate_now = criterion.least_rate(gain, ahead)
             ahead = ahead if abs(rate_now - rate) <= 1e-12 * rate else self._tangent(gain, rate)
-            bound = criterion.least(gain, ahead) + rate * (ahead - total)
-            threshold = ahead + (criterion.least(gain, ahead) - criterion.from_objective(self._best)) / rate
+            at_tangent = float(criterion.least(gain, np.array([ahead]))[0])
+            least = at_tangent + rate * (ahead - by_layer)
+            threshold = ahead + (at_tangent - criterion.from_objective(self._best)) / rate
         else:
-            bound = criterion.least(gain, total)
+            least = criterion.least(gain, by_layer)
             threshold = criterion.needed(gain, self._best) if math.isfinite(self._best) else -math.inf
-        value = criterion.to_objective(criterion.of_gain(gain) + criterion.linear(plan))
-        bound = criterion.to_objective(bound)
-        bound -= _ROUNDING * (abs(bound) + abs(criterion.of_gain(0.0)))
+        value = float(criterion.to_objective(np.array([criterion.of_gain(gain) + criterion.linear(plan)]))[0])
+        by_layer = criterion.to_objective(least)
+        by_layer = by_layer - _ROUNDING * (np.where(np.isinf(by_layer), 0.0, np.abs(by_layer)) + abs(criterion.of_gain(0.0)))
+        bound = float(by_layer[-1])
         missing = self._best - max(part.bound, bound)
         converged = value - max(part.bound, bound) < _CONVERGED * missing if math.isfinite(missing) else False
         part.slow = part.slow + 1 if bound - part.bound < _SLOW * abs(value - part.bound) else 0
         part.is_ready = converged or part.slow >= self._slow_steps
-        part.bound = max(part.bound, bound)
+        part.by_layer = np.maximum(part.by_layer, by_layer)
         if math.isfinite(threshold):
             self._thin(part, weights, lengths, threshold + offset - part.toll * self._max_length)
         part.steps += 1
@@ -286,12 +334,13 @@ class FlowBound:
         if count is None or (line is not None and line[0] >= count[0]):
             assert line is not None
             _, number, normal, at = line
-            is_it = layers.records.number == number
-            one, other = self._begin @ normal, self._end @ normal
-            kept = [
-                allowed_arcs(layers.arcs, part.arcs, ~is_it | side)
-                for side in (np.minimum(one, other) <= at, np.maximum(one, other) >= at)
-            ]
+            which = part.records[layers.records.number[part.records] == number]
+            one, other = (ends @ normal for ends in self._rewards.places(which))
+            kept: list[Int32Array] = []
+            for side in (np.minimum(one, other) <= at, np.maximum(one, other) >= at):
+                allowed = np.ones(len(layers.records.number), dtype=bool)
+                allowed[which[~side]] = False
+                kept.append(allowed_arcs(layers.arcs, part.arcs, allowed))
         else:
             last = layers.arcs.last[part.arcs]
             kept = [part.arcs[(last < 0) | (last <= count[1])], part.arcs[(last < 0) | (last > count[1])]]
@@ -306,21 +355,21 @@ class FlowBound:
         total = float(weights.sum())
         weights = weights / total if total > 0 else np.full(len(courses), 1 / max(len(courses), 1))
         records = used_records(layers.arcs, arcs, len(layers.records.number))
-        return _Part(arcs, records, courses, weights, part.bound, part.toll)
+        return _Part(arcs, records, courses, weights, part.by_layer, part.toll)
 
     def _dividing_line(self, part: _Part, shares: FloatArray) -> tuple[float, int, FloatArray, float] | None:
         """Score, number of a new pose, unit vector, and where along it to cut."""
         records = self._rewards.layers.records
-        middle = (self._begin + self._end) / 2
         best: tuple[float, int, FloatArray, float] | None = None
         numbers = [records.number[course.records] for course in part.courses]
+        middles = [np.mean(self._rewards.places(course.records), axis=0) for course in part.courses]
         for t in range(1, self._rewards.num_new + 1):
             places: list[FloatArray] = []
             weights: list[float] = []
-            for course, number, weight in zip(part.courses, numbers, shares.tolist(), strict=True):
+            for middle, number, weight in zip(middles, numbers, shares.tolist(), strict=True):
                 at = np.flatnonzero(number == t)
                 if at.size and weight > _LEAST_WEIGHT:
-                    places.append(middle[course.records[at[0]]])
+                    places.append(middle[at[0]])
                     weights.append(weight)
             if len(places) < 2:
                 continue

@@ -30,6 +30,34 @@ def on_front(lengths: FloatArray, values: FloatArray) -> IntArray:
     return order[values[order] < best[:-1]]
 
 
+def below_front(bounds: FloatArray, lengths: FloatArray, values: FloatArray) -> FloatArray:
+    """Bounds that are not above the front, from its shortest walk on.
+
+    A walk that closes loops with itself may be better than the bound says, which does not count them.
+
+    Parameters
+    ----------
+    bounds : shape (G, 2)
+        By increasing length.
+    lengths, values : shape (F,)
+        Of the front.
+
+    Returns
+    -------
+    shape (at most G, 2)
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> bounds = np.array([[0.5, 9.0], [1.5, 7.0], [3.0, 5.0]])
+    >>> below_front(bounds, np.array([1.0, 2.0]), np.array([6.0, 4.0])).tolist()
+    [[1.5, 6.0], [3.0, 4.0]]
+    """
+    kept = bounds[bounds[:, 0] >= lengths[0]]
+    best = values[np.searchsorted(lengths, kept[:, 0], side="right") - 1]
+    return np.column_stack([kept[:, 0], np.minimum(kept[:, 1], best)])
+
+
 def spread_on_front(lengths: FloatArray, count: int) -> IntArray:
     """Some points of a front, spread over its lengths: for so many limits at equal distances, the last point within each.
 

@@ -27,8 +27,8 @@ from scipy.linalg import cho_factor, cho_solve, cho_solve_banded, cholesky_bande
 
 from topobelief.arrays import FloatArray, IntArray
 from topobelief.errors import IllConditionedError
-from topobelief.search.plans import Mixture, Plan, alone
-from topobelief.search.reduced_prior import ReducedPrior
+from topobelief.search.plans import Background, Mixture, Plan, alone
+from topobelief.search.reduced_prior import ReducedPrior, in_blocks
 
 Kind = Literal["map", "joint", "error"]
 _JITTER = 1e-13  # relative; added to a covariance that is singular to rounding
@@ -57,6 +57,13 @@ class Slopes:
         before = np.concatenate([np.zeros(1, np.int64), plan.cells[:-1]])[: len(at)]
         of_closures = float(np.vdot(self.closures[variables], plan.closures))
         return of_closures + float(np.vdot(self.odometry[at, before, plan.cells], plan.odometry))
+
+    def of_background(self, background: Background) -> float:
+        """The linear function at a background."""
+        variable, cells = background.target, background.num_cells
+        before = np.where(background.source >= 0, background.source % cells, 0)
+        of_odometry = np.vdot(self.odometry[variable // cells, before, variable % cells], background.odometry)
+        return float(np.vdot(self.closures, background.closures) + of_odometry)
 
 
 def gain(prior: ReducedPrior, kind: Kind, plan: Plan | Mixture) -> float:
@@ -112,8 +119,7 @@ class _Posterior:
         diagonal = added.reshape(len(self.touched), kappa, len(self.touched), kappa)
         every = np.arange(len(self.touched))
         diagonal[every, :, every, :] += number.sum(axis=0)[:, None, None] * closures
-        self.index = (self.touched[:, None] * kappa + np.arange(kappa)).ravel()
-        self.sigma = prior.sigma[np.ix_(self.index, self.index)]
+        self.sigma = prior.sigma(self.touched, self.touched)
         root = _root(self.sigma)
         self.spread = added @ root
         core = root.T @ self.spread
@@ -124,8 +130,7 @@ class _Posterior:
     @property
     def gain(self) -> float:
         if self.kind == "error":
-            assert self.prior.kernel is not None
-            return float(np.vdot(self.effect, self.prior.kernel[np.ix_(self.index, self.index)]))
+            return float(np.vdot(self.effect, self.prior.kernel(self.touched, self.touched)))
         result = float(np.log(np.diagonal(self.root_core[0])).sum())
         if self.kind == "joint":
             result += float(np.log(self.root_new[0]).sum())
@@ -133,22 +138,19 @@ class _Posterior:
 
     def slopes(self, seen: IntArray) -> Slopes:
         prior, kappa = self.prior, self.prior.tangent_dim
-        columns = (seen[:, None] * kappa + np.arange(kappa)).ravel()
-        own = np.searchsorted(columns, self.index)
-        rows = prior.sigma[np.ix_(self.index, columns)]
+        own = in_blocks(np.searchsorted(seen, self.touched), kappa)
+        rows = prior.sigma(self.touched, seen)
         known = self.effect @ rows  # F: P_:: = Sigma_:: - Sigma_:m' F
         if self.kind == "error":
-            assert prior.kernel is not None
-            kernel = prior.kernel[np.ix_(self.index, columns)]
-            inner = prior.kernel[np.ix_(self.index, self.index)]
+            kernel, inner = prior.kernel(self.touched, seen), prior.kernel(self.touched, self.touched)
             mixed = kernel - inner @ known
             among = mixed - (self.sigma @ self.effect) @ mixed  # Q_m',:
-            free = _diagonal_blocks(prior.kernel, seen, kappa) - _products(known, kernel, kappa, twice=True)
+            free = prior.kernel_variances[seen] - _products(known, kernel, kappa, twice=True)
             free += _products(known, inner @ known, kappa)
             scale = 1.0
         else:
             among = rows - self.sigma @ known  # P_m',:
-            free = _diagonal_blocks(prior.sigma, seen, kappa) - _products(rows, known, kappa)
+            free = prior.variances[seen] - _products(rows, known, kappa)
             scale = 0.5
         cross = -self.lever @ among  # new poses with seen ones
         each, odometry = self._among_new(-cross[:, own])
@@ -197,7 +199,7 @@ class _Posterior:
 def _joined(mixture: Mixture) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
     """Odometry: variables that it joins, and information; and the closures of each variable, shape (T C, m)."""
     background, cells = mixture.background, mixture.background.num_cells
-    number = (0.0 if mixture.only_used else mixture.share) * background.closures
+    number = np.zeros_like(background.closures) if mixture.plans else mixture.share * background.closures
     sources, targets, odometry = list[IntArray](), list[IntArray](), list[FloatArray]()
     for plan, weight in zip(mixture.plans, mixture.weights.tolist(), strict=True):
         variables = np.arange(len(plan.closures)) * cells + plan.cells
@@ -244,12 +246,6 @@ def _root(covariance: FloatArray) -> FloatArray:
                 raise IllConditionedError("covariance of the map", math.inf) from None
             continue
         return result
-
-
-def _diagonal_blocks(matrix: FloatArray, nodes: IntArray, kappa: int) -> FloatArray:
-    """Of some nodes, shape (w, kappa, kappa)."""
-    index = nodes[:, None] * kappa + np.arange(kappa)
-    return matrix[index[:, :, None], index[:, None, :]]
 
 
 def _products(left: FloatArray, right: FloatArray, kappa: int, *, twice: bool = False) -> FloatArray:

@@ -80,6 +80,8 @@ class Layers:
     first_vertex
     first_state
         Where walks begin.
+    whole_layers : shape (E,)
+        How many whole layers each way is long.
     """
 
     num_spots: int
@@ -88,6 +90,7 @@ class Layers:
     pieces_per_pose: int
     first_vertex: int
     first_state: int
+    whole_layers: Int32Array
     arcs: Arcs
     records: Records
 
@@ -134,7 +137,10 @@ def build_layers(
     sizes = _arcs(*reach, is_end, nearest, furthest, delta, max_length, begin, False, *_room(0, 0))
     arcs, records = _room(sizes[0], sizes[1])
     _arcs(*reach, is_end, nearest, furthest, delta, max_length, begin, True, arcs, records)
-    return Layers(len(vertex), num_layers, num_labels, pieces_per_pose, first_vertex, begin, Arcs(*arcs), Records(*records))
+    whole = np.maximum(np.floor(ways.lengths / delta - _TIE), 0).astype(np.int32)
+    return Layers(
+        len(vertex), num_layers, num_labels, pieces_per_pose, first_vertex, begin, whole, Arcs(*arcs), Records(*records)
+    )
 
 
 def _room(num_arcs: int, num_records: int) -> tuple[Int32Array, Int32Array]:

@@ -24,11 +24,14 @@ class Longest:
         Which arcs it takes, in order.
     ahead : shape (states,)
         Length of the longest path to each state.
+    by_layer : shape (layers,)
+        Length of the longest path that ends in each layer or in the next one; -inf where none does.
     """
 
     value: float
     arcs: IntArray
     ahead: FloatArray
+    by_layer: FloatArray
 
 
 def longest_path(layers: Layers, which: Int32Array, weights: FloatArray, charge: FloatArray) -> Longest:
@@ -46,12 +49,12 @@ def longest_path(layers: Layers, which: Int32Array, weights: FloatArray, charge:
     """
     arcs, num_spots, num_layers = layers.arcs, layers.num_spots, layers.num_layers
     tables = (which, arcs.source, arcs.target, arcs.way, weights, charge)
-    ahead, before, value, last = _forward(*tables, num_spots, num_layers, layers.first_state)
+    ahead, before, by_layer, value, last = _forward(*tables, layers.whole_layers, num_spots, num_layers, layers.first_state)
     path: list[int] = []
     while last >= 0:
         path.append(int(last))
         last = int(before[arcs.source[last]])
-    return Longest(float(value), np.array(path[::-1], dtype=np.int64), ahead)
+    return Longest(float(value), np.array(path[::-1], dtype=np.int64), ahead, by_layer)
 
 
 def arcs_above(
@@ -72,6 +75,12 @@ def arcs_above(
     return which[_on_long_paths(*tables, num_spots, num_layers, ahead, threshold)]
 
 
+def arcs_to_ends(layers: Layers, which: Int32Array) -> Int32Array:
+    """Those of some arcs from which an end is reached by others of them."""
+    none, any_length = np.zeros(len(which)), np.zeros(layers.num_spots * layers.num_layers)
+    return arcs_above(layers, which, none, np.zeros(len(layers.whole_layers)), any_length, -1.0)
+
+
 @compiled
 def _forward(
     which: Int32Array,
@@ -80,11 +89,13 @@ def _forward(
     way: Int32Array,
     weights: FloatArray,
     charge: FloatArray,
+    whole_layers: Int32Array,
     num_spots: int,
     num_layers: int,
     first_state: int,
-) -> tuple[FloatArray, Int32Array, float, int]:
+) -> tuple[FloatArray, Int32Array, FloatArray, float, int]:
     num_states = num_spots * num_layers
+    by_layer = np.full(num_layers, -np.inf)
     best, before = np.empty(num_states), np.empty(num_states, np.int32)
     for s in range(num_states):
         best[s], before[s] = -np.inf, -1
@@ -112,12 +123,14 @@ def _forward(
             if way[a] >= 0:
                 length -= charge[way[a]]
             if to < 0:
+                end_layer = k + whole_layers[way[a]] if way[a] >= 0 else k
+                by_layer[end_layer] = max(by_layer[end_layer], length)
                 if length > value:
                     value, last = length, a
             elif to >= top and length > best[to]:
                 best[to], before[to] = length, a
         begin = end
-    return best, before, value, last
+    return best, before, by_layer, value, last
 
 
 @compiled

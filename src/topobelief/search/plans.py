@@ -54,7 +54,8 @@ class Plan:
 
 @dataclass(frozen=True, slots=True)
 class Background:
-    """A little of everything that walks may add, so that each variable has some information.
+    """The mean of everything that walks may add: where the optimisation begins. A little of its odometry is added to each
+    mixture of walks, so that each variable has some information.
 
     Attributes
     ----------

@@ -11,22 +11,25 @@ positions of a sample S of the poses, Pi what is left of them after the best rig
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
 
 import numpy as np
 
 from topobelief.arrays import FloatArray, IntArray
 from topobelief.errors import IllConditionedError
-from topobelief.forms.prior_factors import PriorFactors
+from topobelief.forms.prior_factors import PriorFactors, form_of
 from topobelief.geometry import Group
 from topobelief.graph.alignment import DEFAULT_SAMPLE_SIZE, Alignment
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg.elimination_paths import FormFactor
+from topobelief.linalg.elimination_tree import EliminationTree
+from topobelief.linalg.solutions import solutions
 
 
-@dataclass(frozen=True, slots=True)
 class ReducedPrior:
     """The prior on the poses that can be seen.
+
+    Covariances with a pose are computed when they are first asked for, and kept: a plan touches few of many poses.
 
     Attributes
     ----------
@@ -36,84 +39,111 @@ class ReducedPrior:
         Poses of the prior that are not held.
     log_det
         ln det of the prior's information.
-    sigma : shape (m kappa, m kappa)
-        Covariance of the seen poses in world twists; rows of the pose that is held are 0.
     closures : shape (m, kappa, kappa)
         W of a closure with each of them, its probability included.
     earliest : shape (m,)
         The first new pose that is far enough away along the way to close a loop with it.
-    kernel : shape (m kappa, m kappa), or None
-        K, square metres.
+    variances : shape (m, kappa, kappa)
+        Covariance of each of them in world twists; 0 for the pose that is held.
     mean_square
-        Expected mean square error of the map now, square metres; nan without a kernel.
+        Expected mean square error of the map now, square metres; nan where it is not asked for.
+    kernel_variances : shape (m, kappa, kappa)
+        Diagonal blocks of K; nothing where errors are not asked for.
     """
 
-    tangent_dim: int
-    num_free: int
-    log_det: float
-    sigma: FloatArray
-    closures: FloatArray
-    earliest: IntArray
-    kernel: FloatArray | None
-    mean_square: float
+    def __init__(
+        self,
+        graph: PoseGraph,
+        pose: int,
+        seen: IntArray,
+        information: FloatArray,
+        *,
+        probability: float,
+        min_index_gap: int,
+        with_errors: bool,
+    ) -> None:
+        """The prior on some poses.
+
+        Parameters
+        ----------
+        graph
+            At its estimate.
+        pose
+            Which is held.
+        seen : shape (m,)
+            Poses, ascending.
+        information : shape (kappa, kappa)
+            Of a closure.
+        probability
+            By which it is scaled.
+        min_index_gap
+        with_errors
+            Whether the expected error of the map is asked for.
+        """
+        group, kappa = graph.group, graph.tangent_dim
+        form = form_of("joint", PriorFactors(graph, pose))
+        factor = FormFactor.of(EliminationTree.build(graph.edges, graph.num_poses, pose), form).or_with_strong_rows_last(form)
+        if not np.isfinite(factor.log_det.error):
+            raise IllConditionedError("covariance of the map", factor.log_det.error)
+        self._factor, self._seen = factor, seen
+        self._twists = to_twists(group, graph.positions[seen] - graph.positions[pose])
+        self.tangent_dim, self.num_free, self.log_det = kappa, graph.num_poses - 1, factor.log_det.value
+        adjoint = world_to_body(group, graph.poses[seen], graph.positions[pose])
+        self.closures = probability * adjoint.transpose(0, 2, 1) @ information @ adjoint
+        self.earliest = np.where(seen > pose, 1, np.maximum(min_index_gap - (pose - seen), 1))
+        self.variances = self._twists @ _variances(factor, seen) @ self._twists.transpose(0, 2, 1)
+        self.mean_square, self._effects = np.nan, np.zeros((len(seen) * kappa, 0))
+        if with_errors:
+            alignment = Alignment.of(graph.positions, DEFAULT_SAMPLE_SIZE)
+            solved = solutions(factor, alignment.nodes, alignment.columns(kappa))
+            self.mean_square = float(solved.trace.value) / len(alignment.nodes)
+            effects = self._twists @ solved.values[seen] / math.sqrt(len(alignment.nodes))
+            self._effects = effects.reshape(len(seen) * kappa, -1)
+        by_pose = self._effects.reshape(len(seen), kappa, -1)
+        self.kernel_variances = by_pose @ by_pose.transpose(0, 2, 1)
+        self._place = np.full(len(seen), -1)  # of the rows of each seen pose in the tables
+        self._sigma = self._kernel = np.zeros((0, len(seen) * kappa))
+
+    def sigma(self, rows: IntArray, columns: IntArray) -> FloatArray:
+        """Covariance between some seen poses and others, in world twists, shape (rows kappa, columns kappa)."""
+        return self._part(self._tables(rows)[0], rows, columns)
+
+    def kernel(self, rows: IntArray, columns: IntArray) -> FloatArray:
+        """K likewise, square metres."""
+        return self._part(self._tables(rows)[1], rows, columns)
+
+    def _part(self, table: FloatArray, rows: IntArray, columns: IntArray) -> FloatArray:
+        return table[np.ix_(in_blocks(self._place[rows], self.tangent_dim), in_blocks(columns, self.tangent_dim))]
+
+    def _tables(self, rows: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Both tables, with the rows of some poses."""
+        new = rows[self._place[rows] < 0]
+        if len(new):
+            kappa, count = self.tangent_dim, len(new) * self.tangent_dim
+            unit = np.eye(count).reshape(len(new), kappa, count)
+            solved = self._twists @ solutions(self._factor, self._seen[new], unit).values[self._seen]
+            turned = self._twists[new] @ solved.reshape(-1, len(new), kappa).transpose(1, 2, 0)
+            self._sigma = np.concatenate([self._sigma, turned.reshape(count, -1)])
+            self._kernel = np.concatenate([self._kernel, self._effects[in_blocks(new, kappa)] @ self._effects.T])
+            self._place[new] = np.arange(len(self._sigma) // kappa - len(new), len(self._sigma) // kappa)
+        return self._sigma, self._kernel
 
 
-def reduced_prior(
-    graph: PoseGraph,
-    pose: int,
-    seen: IntArray,
-    information: FloatArray,
-    *,
-    probability: float,
-    min_index_gap: int,
-    with_errors: bool,
-) -> ReducedPrior:
-    """The prior on some poses.
+def in_blocks(poses: IntArray, kappa: int) -> IntArray:
+    """Indices of the kappa variables of each of some poses."""
+    return (poses[:, None] * kappa + np.arange(kappa)).ravel()
 
-    Parameters
-    ----------
-    graph
-        At its estimate.
-    pose
-        Which is held.
-    seen : shape (m,)
-        Poses, ascending.
-    information : shape (kappa, kappa)
-        Of a closure.
-    probability
-        By which it is scaled.
-    min_index_gap
-    with_errors
-        Whether the expected error of the map is asked for.
-    """
-    factor = PriorFactors(graph, pose).factor("joint", 0.0)
-    if not np.isfinite(factor.log_det.error):
-        raise IllConditionedError("covariance of the map", factor.log_det.error)
-    alignment = Alignment.of(graph.positions, DEFAULT_SAMPLE_SIZE)
-    sample = alignment.nodes if with_errors else np.zeros(0, dtype=np.int64)
-    wanted = np.union1d(seen, sample)
-    rows = _inverse_root(factor, wanted)  # covariance of the wanted poses is rows rows^T, in (dp, dphi)
-    group, kappa, k = graph.group, graph.tangent_dim, graph.group.position_dim
-    seen_rows = to_twists(group, graph.positions[seen] - graph.positions[pose]) @ rows[np.searchsorted(wanted, seen)]
-    flat = seen_rows.reshape(len(seen) * kappa, -1)
-    kernel, mean_square = None, np.nan
-    if with_errors:
-        positions = rows[np.searchsorted(wanted, sample), :k].reshape(len(sample) * k, -1)
-        aligned = alignment.columns(k)[:, :k].reshape(len(positions), -1) @ positions
-        mean_square = float(np.sum(aligned**2)) / len(sample)
-        mixed = flat @ aligned.T
-        kernel = mixed @ mixed.T / len(sample)
-    adjoint = world_to_body(group, graph.poses[seen], graph.positions[pose])
-    return ReducedPrior(
-        kappa,
-        graph.num_poses - 1,
-        factor.log_det.value,
-        flat @ flat.T,
-        probability * adjoint.transpose(0, 2, 1) @ information @ adjoint,
-        np.where(seen > pose, 1, np.maximum(min_index_gap - (pose - seen), 1)),
-        kernel,
-        mean_square,
-    )
+
+def _variances(factor: FormFactor, nodes: IntArray) -> FloatArray:
+    """Diagonal blocks of the inverse at some nodes, shape (w, b, b); the held node's is 0."""
+    at = factor.tree.position[nodes]
+    places = np.sort(at[at >= 0])
+    paths = factor.paths(places)
+    result = np.zeros((len(nodes), factor.block_size, factor.block_size))
+    for node in np.flatnonzero(at >= 0).tolist():
+        place = int(np.searchsorted(places, at[node]))
+        result[node] = paths.inverse_block(place, place)
+    return result
 
 
 def to_twists(group: Group, offsets: FloatArray) -> FloatArray:
@@ -132,30 +162,3 @@ def world_to_body(group: Group, poses: FloatArray, origin: FloatArray) -> FloatA
     moved = poses.copy()
     moved[:, : group.position_dim] -= origin
     return group.adjoint(group.inverse(moved))
-
-
-def _inverse_root(factor: FormFactor, nodes: IntArray) -> FloatArray:
-    """X with X_s X_t^T = (M^-1)_st for some nodes of a form's matrix M, shape (w, b, c); the held node's is 0."""
-    tree, b = factor.tree, factor.block_size
-    at = tree.position[nodes]
-    places = np.sort(at[at >= 0])
-    paths = factor.paths(places)
-    ancestors = np.zeros(tree.num_free, dtype=bool)
-    chains: list[IntArray] = []
-    for place in places.tolist():
-        chain: list[int] = []
-        node = place
-        while node >= 0:
-            chain.append(node)
-            node = int(tree.parent[node])
-        chains.append(np.array(chain[::-1]))
-        ancestors[chains[-1]] = True
-    column = np.cumsum(ancestors) - 1
-    result = np.zeros((len(nodes), b, int(ancestors.sum()), b))
-    index = np.searchsorted(places, at)
-    for row in np.flatnonzero(at >= 0).tolist():
-        path = int(index[row])
-        length, start = int(paths.lengths[path]), int(paths.start[path])
-        values = paths.values[start : start + b * b * length].reshape(b, length, b)
-        result[row][:, column[chains[path]]] = values
-    return result.reshape(len(nodes), b, -1)

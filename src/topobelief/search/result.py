@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from topobelief.arrays import FloatArray, ReadOnlyArrays, frozen_floats
 from topobelief.graph.action import Action
 from topobelief.search.front import spread_on_front
@@ -53,10 +55,16 @@ class SearchResult(ReadOnlyArrays):
         The best way found at each length, by increasing length and decreasing objective.
     front : shape (F, 2)
         Metres and objective of the ways on the front, cost excluded: what each further metre buys. `cost_per_metre` picks one.
+    front_bounds : shape (G, 2)
+        Metres and a value: no walk of up to so many metres has a smaller objective, cost excluded. By increasing length and
+        decreasing value; between two of the lengths the value of the longer one holds. Empty where nothing is known.
     lower_bound : float
         No walk of the class has a smaller value, cost included; -inf where nothing is known.
     covers : str
         Which walks the lower bound covers, and which bound it is; empty where there is none.
+    value_with_map_alone : float
+        Value of the best way if loop closures among its own new poses did not count, as the lower bound has it; at least
+        `value`.
     proven_optimal : bool
         Whether the lower bound meets the value, to rounding or to the gap that was asked for as 0.
     value_now : float
@@ -82,8 +90,10 @@ class SearchResult(ReadOnlyArrays):
     alternatives: tuple[Way, ...]
     on_front: tuple[Way, ...]
     front: FloatArray
+    front_bounds: FloatArray
     lower_bound: float
     covers: str
+    value_with_map_alone: float
     proven_optimal: bool
     value_now: float
     shortest: Way | None
@@ -97,6 +107,7 @@ class SearchResult(ReadOnlyArrays):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "front", frozen_floats(self.front, name="front"))
+        object.__setattr__(self, "front_bounds", frozen_floats(self.front_bounds, name="front_bounds"))
 
     @property
     def path(self) -> FloatArray:
@@ -122,6 +133,16 @@ class SearchResult(ReadOnlyArrays):
     def gap(self) -> float:
         """No walk of the class is better than the best way by more than this; inf where nothing is known."""
         return max(0.0, self.value - self.lower_bound)
+
+    def bound_within(self, length: float) -> float:
+        """No walk of up to a length has a smaller objective, cost excluded; -inf where nothing is known."""
+        place = int(np.searchsorted(self.front_bounds[:, 0], length))
+        return float(self.front_bounds[place, 1]) if place < len(self.front_bounds) else -math.inf
+
+    @property
+    def own_closures_gain(self) -> float:
+        """By how much the loops that the best way closes with itself better its value; the certificate does not count such."""
+        return max(0.0, self.value_with_map_alone - self.value)
 
     @property
     def unit(self) -> str:

@@ -26,6 +26,8 @@ from topobelief.search.plans import Background, Plan
 from topobelief.search.reduced_prior import world_to_body
 from topobelief.search.ways import Sightings, Ways
 
+_MOST_IN_BACKGROUND = 200  # seen poses that it closes loops with
+
 
 @dataclass(frozen=True, slots=True)
 class Course:
@@ -148,7 +150,10 @@ class Rewards:
         return Course(path, records, plan)
 
     def background(self) -> Background:
-        """The mean of what the records of each pose in each cell add, and of the odometry from each cell to each other."""
+        """The mean of what the records of each pose in each cell add, and of the odometry from each cell to each other.
+
+        Of many seen poses that follow each other one takes the closures of all.
+        """
         layers, sightings = self.layers, self.sightings
         records, cells = layers.records, layers.num_labels
         shape = (self.num_new * cells, len(self.earliest))
@@ -157,11 +162,14 @@ class Rewards:
             records.number, records.way, records.piece, records.before, self.cells, sightings.first, sightings.start,
             sightings.poses, self.earliest, self.powers[0], closures, links,
         )  # fmt: skip
+        parts = np.array_split(np.arange(shape[1]), min(shape[1], _MOST_IN_BACKGROUND))
+        few = np.zeros(shape)
+        few[:, [part[len(part) // 2] for part in parts]] = np.add.reduceat(closures, [part[0] for part in parts], axis=1)
         if self.idle.any():
             links[:] += self.idle
         t, before, cell = np.nonzero(links.any(axis=(3, 4)))
         source = np.where(t > 0, (t - 1) * cells + before, -1)
-        return Background(cells, closures, source, t * cells + cell, links[t, before, cell])
+        return Background(cells, few, source, t * cells + cell, links[t, before, cell])
 
     def _odometry_at(self, way: int, piece: int) -> list[FloatArray]:
         length = float(self.ways.lengths[way])
@@ -169,15 +177,14 @@ class Rewards:
         places = [length] if is_end else [piece * self.delta, min((piece + 1) * self.delta, length)]
         return [self.powers[0, way] + u * self.powers[1, way] + u * u * self.powers[2, way] for u in places]
 
-    def places(self) -> tuple[FloatArray, FloatArray]:
-        """Where the pieces of all records begin and end, metres, shape (R, 2) each."""
-        records, ways = self.layers.records, self.ways
-        length = ways.lengths[records.way]
-        along = (ways.end - ways.begin)[records.way] / length[:, None]
-        begin = np.minimum(records.piece * self.delta, length)
+    def places(self, which: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Where the pieces of some records begin and end, metres, shape (number of records, 2) each."""
+        ways, way, piece = self.ways, self.layers.records.way[which], self.layers.records.piece[which]
+        length = ways.lengths[way]
+        along = (ways.end - ways.begin)[way] / length[:, None]
+        begin = np.minimum(piece * self.delta, length)
         end = np.minimum(begin + self.delta, length)
-        origin = ways.begin[records.way]
-        return origin + begin[:, None] * along, origin + end[:, None] * along
+        return ways.begin[way] + begin[:, None] * along, ways.begin[way] + end[:, None] * along
 
 
 def odometry_powers(group: Group, poses: FloatArray, origin: FloatArray, information: FloatArray) -> FloatArray:

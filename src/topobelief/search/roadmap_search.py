@@ -31,7 +31,8 @@ from topobelief.search.anytime import AnytimeSearch, SearchProgress
 from topobelief.search.bound import WalkBound
 from topobelief.search.evaluations import Evaluations
 from topobelief.search.flow_bound import flow_bound
-from topobelief.search.front import on_front
+from topobelief.search.front import below_front, on_front
+from topobelief.search.front_bounds import FrontBounds
 from topobelief.search.local_search import LocalSearch, spread_vias
 from topobelief.search.result import SearchResult, Way
 from topobelief.search.walks import Walk, Walks
@@ -152,8 +153,8 @@ def search_roadmap(
     candidates = spread_vias(walks, to_poses < model.radius, _NUM_CANDIDATES)
     local = LocalSearch(walks, evaluations, candidates, rng=np.random.default_rng(seed))
 
-    def bound() -> WalkBound:
-        return flow_bound(
+    def bounds() -> tuple[WalkBound, FrontBounds]:
+        whole = flow_bound(
             graph,
             walks.roadmap,
             start=walks.start,
@@ -169,13 +170,15 @@ def search_roadmap(
             return_to_start=return_to_start,
             pose=begin.pose,
         )
+        shortest = 0.0 if goal is None else float(walks.distances(walks.start)[walks.end or 0])
+        return whole, FrontBounds(whole, shortest, walks.max_length)
 
     stay = Action(np.zeros((0, graph.poses.shape[1])), np.zeros((0, 2), np.int64), of_odometry)
     value_now = float(planner.entropies([stay])[0])
     search = AnytimeSearch(
         evaluations,
         local,
-        bound if turn is None and (deadline is None or _seconds_for_bound(walks) <= deadline) else None,
+        bounds if turn is None and (deadline is None or _seconds_for_bound(walks) <= deadline) else None,
         began=began,
         deadline=deadline,
         gap=gap,
@@ -200,8 +203,10 @@ def search_roadmap(
         alternatives=tuple(way(walk) for walk in others),
         on_front=tuple(map(way, walks_on_front)),
         front=np.column_stack([lengths[front], objectives[front]]),
+        front_bounds=below_front(search.front_bounds, lengths[front], objectives[front]),
         lower_bound=search.lower_bound,
         covers=search.covers,
+        value_with_map_alone=evaluations.value_with_map_alone(best),
         proven_optimal=search.proven,
         value_now=value_now,
         shortest=None if goal is None else way(walks.walk(())),

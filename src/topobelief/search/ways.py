@@ -21,7 +21,7 @@ from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg.block_cholesky import Int32Array
 from topobelief.linalg.compiled import compiled
 from topobelief.world import World
-from topobelief.world.sight import seen_parts
+from topobelief.world.sight import SeenParts, seen_parts
 
 _ROUNDING = 1e-9
 
@@ -152,7 +152,7 @@ def _seen_along(
     half = np.sqrt(np.maximum(rule.radius**2 - height[seen] ** 2 - np.sum(offset**2, axis=1) + at**2, 0.0))
     lower, upper = np.maximum(at - half, 0.0), np.minimum(at + half, ways.lengths[way])
     if world is not None:
-        parts = seen_parts(world, positions[seen], ways.begin[way], ways.end[way])
+        parts = _seen_parts(world, ways, positions, way, seen)
         length = ways.lengths[way][parts.which]
         lower, upper = (
             np.maximum(lower[parts.which], parts.lower * length),
@@ -162,6 +162,22 @@ def _seen_along(
         overlap = lower <= upper
         way, seen, lower, upper = way[overlap], seen[overlap], lower[overlap], upper[overlap]
     return way, seen, lower, upper, height[seen] ** 2
+
+
+def _seen_parts(world: World, ways: Ways, positions: FloatArray, way: IntArray, seen: IntArray) -> SeenParts:
+    """What of some ways poses see; a way and the way back are looked at once."""
+    source, target = ways.source[way], ways.target[way]
+    size = int(max(ways.source.max(), ways.target.max())) + 1
+    keys = (np.minimum(source, target) * size + np.maximum(source, target)) * len(positions) + seen
+    _, one, same = np.unique(keys, return_index=True, return_inverse=True)
+    parts = seen_parts(world, positions[seen[one]], ways.begin[way[one]], ways.end[way[one]])
+    first = np.searchsorted(parts.which, np.arange(len(one) + 1))
+    count = np.diff(first)[same]
+    which = np.repeat(np.arange(len(way)), count)
+    at = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count) + np.repeat(first[same], count)
+    back = (source != source[one][same])[which]
+    lower, upper = parts.lower[at], parts.upper[at]
+    return SeenParts(which, np.where(back, 1 - upper, lower), np.where(back, 1 - lower, upper))
 
 
 def _aligned(graph: PoseGraph, ways: Ways, pose: int, way: IntArray, seen: IntArray, rule: ClosureModel) -> BoolArray:
