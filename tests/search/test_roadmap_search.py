@@ -184,6 +184,15 @@ def test_where_nothing_is_seen_again_the_result_says_so():
     assert "Nothing to gain" in to_goal.summary()
 
 
+def test_a_single_pose_has_no_error_to_lose():
+    graph = tb.PoseGraph([[0.0, 0.0, 0.0]], np.zeros((0, 2), int), None, np.zeros((0, 3, 3)))
+    roadmap = Roadmap(np.array([[0.0, 0.0], [4.0, 0.0], [2.0, 1.0]]), np.array([[0, 1], [0, 2], [1, 2]]))
+    options = {"goal": (4, 0), "max_detour": 2.0, "objective": "error", "closures": CLOSURES, "information": np.eye(3)}
+    found = tb.search_roadmap(graph, roadmap, **options)
+    assert found.value == found.value_now == 0.0
+    assert found.length == 4.0
+
+
 def test_a_deadline_of_no_time_gives_the_shortest_way():
     graph, roadmap = scene(3)
     result = search(graph, roadmap, goal=roadmap.vertices[1], max_detour=2.0, deadline=0.0)

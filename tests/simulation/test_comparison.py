@@ -11,9 +11,20 @@ from compared_plays import compared_run
 from topobelief.errors import InvalidInputError
 from topobelief.estimation import optimize
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.simulation.comparison import HINDSIGHT, ComparedRun, compared_strategy, redrawn_errors, restricted, summarised
+from topobelief.simulation.comparison import (
+    HINDSIGHT,
+    ComparedRun,
+    compared_runs,
+    compared_strategy,
+    redrawn_errors,
+    restricted,
+    summarised,
+)
 from topobelief.simulation.metrics import trajectory_error
 from topobelief.simulation.noise import InjectedNoise
+from topobelief.simulation.record import RunOptions
+from topobelief.simulation.scenario import Goal, Scenario
+from topobelief.world import World
 
 NOISE = InjectedNoise.of_ratio(0.35)
 
@@ -70,6 +81,18 @@ def test_what_cannot_be_compared(name, message):
 
 def run(seed: int, strategy: str, error: float) -> ComparedRun:
     return compared_run(seed, strategy, error_shared=error, error_all=error)
+
+
+def test_a_path_of_its_own_is_no_candidate_of_the_others():
+    """Around a pillar; whichever strategy comes first, the others choose among the same paths."""
+    world = World.from_boxes([(3, 3, 5, 5)], bounds=(0, 0, 8, 8))
+    scenario = Scenario("room", world, (1.5, 1.5, 0.0), (Goal((6.5, 1.5), 2), Goal((1.5, 6.5), 3)))
+    own, shortest = compared_runs(scenario, RunOptions(), ["roadmap", "path-0"], NOISE, num_redraws=2)
+    assert (own.strategy, own.chosen, own.num_candidates) == ("roadmap", 3, 4)
+    assert (shortest.strategy, shortest.chosen, shortest.num_candidates) == ("path-0", 0, 3)
+    assert own.outcome == shortest.outcome == "arrived"
+    assert own.num_shared == shortest.num_shared
+    assert own.predicted <= shortest.predicted + 1e-9
 
 
 def test_a_summary_pairs_runs_by_seed():

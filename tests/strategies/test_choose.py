@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from topobelief.candidates.diverse_paths import diverse_paths
 from topobelief.candidates.polyline import path_length
 from topobelief.candidates.predicted_factors import predict_actions
+from topobelief.candidates.propose import CandidateRule, predict_along
+from topobelief.candidates.roadmap import build_roadmap
 from topobelief.errors import InvalidInputError
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.planner import Planner
@@ -14,8 +19,9 @@ from topobelief.planning.registry import OBJECTIVES, SIGNATURES, imported
 from topobelief.strategies import choose as choose_module
 from topobelief.strategies.choice import Reasons
 from topobelief.strategies.choose import choose
-from topobelief.strategies.question import Question
-from topobelief.strategies.registry import STRATEGIES, checked_strategy
+from topobelief.strategies.question import Ground, Question
+from topobelief.strategies.registry import STRATEGIES, checked_strategy, proposes
+from topobelief.world import World
 
 INFORMATION = np.diag([100.0, 100.0, 800.0])
 
@@ -34,8 +40,19 @@ def question():
     return graph, actions, np.array([path_length(path) for path in paths])
 
 
-def chosen(question, strategy, *, objective="joint", seed=0):
-    return choose(strategy, Question(*question, np.random.default_rng(seed).random(3), objective))
+WORLD = World.from_boxes([(4, 2, 6, 4)], bounds=(-2, -2, 12, 10))
+RULE = CandidateRule(max_detour=1.5, turn=None)
+AMONG_CANDIDATES = [name for name in STRATEGIES if not proposes(name)]
+
+
+@pytest.fixture(scope="module")
+def ground():
+    goal = (1.0, 1.5)
+    return Ground(build_roadmap(WORLD, (10, 0), goal, 100, 0.3), goal, WORLD, RULE)
+
+
+def chosen(question, strategy, *, objective="joint", seed=0, ground=None):
+    return choose(strategy, Question(*question, np.random.default_rng(seed).random(3), objective, ground=ground))
 
 
 @pytest.mark.parametrize("objective", list(OBJECTIVES))
@@ -56,7 +73,7 @@ def test_reasons_hold(question, objective):
     graph, actions, _ = question
     values = Planner(graph, objective=objective).entropies(actions)
     with_reasons = [*SIGNATURES, "optimum", "standard"]
-    for strategy in STRATEGIES:
+    for strategy in AMONG_CANDIDATES:
         choice = chosen(question, strategy, objective=objective)
         reasons, value = choice.reasons, values[choice.index]
         if strategy in with_reasons:
@@ -74,7 +91,7 @@ def test_the_largest_score_is_chosen(question, strategy):
 
 
 @pytest.mark.parametrize("strategy", [*STRATEGIES, "path-2"])
-def test_seconds_end_with_the_answer(question, strategy, monkeypatch):
+def test_seconds_end_with_the_answer(question, ground, strategy, monkeypatch):
     """The clock runs from the question to the index for every strategy alike; the reasons are worked out after it stops."""
     events = []
 
@@ -102,7 +119,7 @@ def test_seconds_end_with_the_answer(question, strategy, monkeypatch):
     load = choose_module.imported
     monkeypatch.setattr(choose_module, "time", Clock)
     monkeypatch.setattr(choose_module, "imported", timed)
-    choice = chosen(question, strategy)
+    choice = chosen(question, strategy, ground=ground)
     assert events == ["clock", "answer", "clock", "reasons"]
     assert choice.seconds == 2.0
 
@@ -156,3 +173,27 @@ def test_unknown_strategies_are_refused():
     for name in ("spanning", "path-", "path-01", "path-1x"):
         with pytest.raises(InvalidInputError, match="spanning_trees"):
             checked_strategy(name)
+
+
+@pytest.mark.parametrize("limit", [1.5, None])
+def test_roadmap_finds_a_path_of_its_own(question, ground, limit):
+    """No longer than candidates may be, and as good as any path of the roadmap that was made otherwise."""
+    graph, actions, lengths = question
+    rule = replace(ground.rule, max_detour=limit)
+    on_roadmap = diverse_paths(ground.roadmap, (10, 0), ground.goal, 20, limit or 2.0)
+    lengths = np.array([path_length(path) for path in on_roadmap])
+    actions = predict_along(graph, WORLD, on_roadmap, rule)
+    asked = Question(graph, actions, lengths, np.zeros(len(actions)), "error", ground=replace(ground, rule=rule))
+    choice = choose("roadmap", asked)
+    assert choice.index == len(actions)
+    joined = asked.joined_by(choice.proposal)
+    values = joined.values()
+    assert len(joined.actions) == len(joined.lengths) == len(joined.random_scores) == len(actions) + 1
+    assert values[-1] <= values.min() + 1e-9
+    assert joined.lengths[-1] <= lengths.max() + 1e-9 if limit is None else joined.lengths[-1] <= 1.5 * lengths.min() + 1e-9
+    assert asked.joined_by(None) is asked
+
+
+def test_roadmap_needs_one(question):
+    with pytest.raises(InvalidInputError, match='expected a roadmap for the strategy "roadmap" to search'):
+        chosen(question, "roadmap")

@@ -51,7 +51,7 @@ def simulate(
         str | None,
         typer.Option(
             help="A signature: resistance, spanning_trees, von_neumann_approx or von_neumann; optimum (proven), standard (all "
-            "exact), shortest, random, or path-k: path-0 is the shortest path, path-1 the next.",
+            "exact), roadmap (the best way of the whole roadmap), shortest, random, or path-k: path-0 is the shortest path.",
             show_default="resistance for error, else spanning_trees",
         ),
     ] = None,

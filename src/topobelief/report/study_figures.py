@@ -31,6 +31,7 @@ _LIGHTEST, _DARKEST = "#7DB8DE", "#0B2F5B"
 STRATEGY_NAMES = {
     "optimum": "proven optimum",
     "standard": "standard BSP",
+    "roadmap": "whole roadmap",
     "resistance": "effective resistance",
     "spanning_trees": "spanning trees",
     "von_neumann": "von Neumann",

@@ -118,8 +118,11 @@ class Criterion:
         return math.sqrt(max(self.start - gain, 0.0)) if self.kind == "error" else self.start - gain
 
     def rate(self, gain: float) -> float:
-        """How much the rest falls with the gain."""
-        return 0.5 / math.sqrt(max(self.start - gain, 1e-30 * self.start)) if self.kind == "error" else 1.0
+        """How much the rest falls with the gain; 0 where there is no error to lose, as on a single pose."""
+        if self.kind == "error":
+            left = max(self.start - gain, 1e-30 * self.start)
+            return 0.5 / math.sqrt(left) if left > 0 else 0.0
+        return 1.0
 
     def least(self, gain: float, ahead: FloatArray) -> FloatArray:
         """Lower bound of the rest where the linear function is D = `ahead` above the gain; convex and falling in D."""
@@ -135,7 +138,7 @@ class Criterion:
         """How fast that falls with D."""
         if self.kind == "error":
             left = self.start - gain
-            return 0.5 * left**-0.5 * (1 + ahead / left) ** -1.5
+            return 0.5 * left**-0.5 * (1 + ahead / left) ** -1.5 if left > 0 else 0.0
         return 1 / (1 + 2 * ahead / self.size)
 
     def needed(self, gain: float, value: float) -> float:

@@ -25,7 +25,7 @@ from topobelief.simulation.record import ARRIVED, History, Leg, Record, RunOptio
 from topobelief.simulation.scenario import Scenario
 from topobelief.strategies.choose import choose
 from topobelief.strategies.question import Question
-from topobelief.strategies.registry import checked_strategy
+from topobelief.strategies.registry import checked_strategy, proposes
 
 SHARED_STRATEGY = "shortest"
 """How the sessions are driven that all compared runs share."""
@@ -219,7 +219,6 @@ class _Seed:
         self._scenario, self._options, self._history = scenario, options, history
         self._noise, self._num_redraws = noise, num_redraws
         self._question: Question | None = None
-        self._values: FloatArray | None = None
         self._error_before: float | None = None
         self._driven: dict[int, ComparedRun] = {}  # by candidate, where the robot decided once
 
@@ -227,7 +226,7 @@ class _Seed:
         """What a strategy comes to."""
         strategy, _, own = name.partition(":")
         options = replace(self._options, strategy=strategy, objective=own or self._options.objective)
-        if self._question is not None:
+        if self._question is not None and not proposes(strategy):
             index = choose(strategy, replace(self._question, objective=options.objective)).index
             if index in self._driven:
                 return replace(self._driven[index], strategy=name)
@@ -237,10 +236,11 @@ class _Seed:
         """What a record comes to under redrawn noise."""
         goal = len(self._scenario.goals)
         legs = [leg for leg in record.legs if leg.goal == goal]
-        question = next((each.question for each in record.deliberations if record.legs[each.leg].goal == goal), None)
-        if self._question is None and question is not None:
-            self._question = replace(question, objective=self._options.objective)
-            self._values = self._question.values()
+        deliberation = next((each for each in record.deliberations if record.legs[each.leg].goal == goal), None)
+        question = None if deliberation is None else replace(deliberation.question, objective=self._options.objective)
+        is_shared = deliberation is not None and deliberation.choice.proposal is None
+        if self._question is None and is_shared:
+            self._question = question
         chosen = legs[0].chosen if question is not None else 0
         num_poses = len(record.truth)
         num_shared = legs[0].first_pose + 1 if legs else num_poses
@@ -259,13 +259,13 @@ class _Seed:
             num_poses=num_poses,
             num_shared=num_shared,
             num_closures=sum(leg.num_closures for leg in legs),
-            predicted=float("nan") if question is None or self._values is None else float(self._values[chosen]),
+            predicted=float("nan") if question is None else float(question.planner().entropies([question.actions[chosen]])[0]),
             error_shared=float(errors[:, 0].mean()),
             error_all=float(errors[:, -1].mean()),
             spread_shared=float(errors[:, 0].std()),
             error_before=self._error_before,
         )
-        if question is not None and _in_one_go(legs):
+        if is_shared and _in_one_go(legs):
             self._driven[chosen] = run
         return run
 

@@ -42,7 +42,7 @@ from topobelief.simulation.scenario import Goal, Scenario
 from topobelief.simulation.slam import Slam
 from topobelief.simulation.ways import known_candidates, place_with_room, stands_in_the_way
 from topobelief.strategies.choose import choose
-from topobelief.strategies.question import Question
+from topobelief.strategies.question import Ground, Question
 from topobelief.world import World
 
 _BLOCKED = "blocked: by something unknown before, seen from"
@@ -241,15 +241,18 @@ class Episode:
         candidates_seconds = time.perf_counter() - begin
         drawn = int(self._rng(_CHOICE, len(self._legs)).integers(len(actions)))
         random_scores = np.eye(len(actions))[drawn]
-        question = Question(belief, actions, lengths, random_scores, options.objective)
+        ground = Ground(found.routes.roadmap, goal.place, known, rule)
+        question = Question(belief, actions, lengths, random_scores, options.objective, ground=ground)
         choice = choose(options.strategy, question)
-        values = question.values()
-        deliberation = Deliberation(leg=len(self._legs), question=question, paths=found.paths, values=values, choice=choice)
+        own = choice.proposal
+        question = question.joined_by(own)
+        values, paths = question.values(), found.paths if own is None else [*found.paths, own.path]
+        deliberation = Deliberation(leg=len(self._legs), question=question, paths=paths, values=values, choice=choice)
         return deliberation, replace(
             leg,
-            num_candidates=len(actions),
+            num_candidates=len(paths),
             chosen=choice.index,
-            planned=float(lengths[choice.index]),
+            planned=float(question.lengths[choice.index]),
             prior_value=value_after(belief, belief.num_poses, options.objective),
             predicted_value=float(values[choice.index]),
             candidates_seconds=candidates_seconds,

@@ -8,6 +8,7 @@ from typing import Protocol
 
 from topobelief.arrays import FloatArray
 from topobelief.planning.decision import Decision
+from topobelief.search.result import Way
 from topobelief.strategies.question import Question
 
 
@@ -30,6 +31,8 @@ class Reasons:
     num_evaluations : int
         Exact values computed.
     proven_optimal : bool
+    proposal : Way or None
+        The chosen path, where the strategy has found one of its own.
     """
 
     decision: Decision | None = None
@@ -40,6 +43,7 @@ class Reasons:
     num_survivors: int | None = None
     num_evaluations: int = 0
     proven_optimal: bool = False
+    proposal: Way | None = None
 
     @classmethod
     def of(cls, decision: Decision, *, scores: FloatArray | None = None) -> Reasons:
@@ -63,7 +67,7 @@ class Choice:
     Attributes
     ----------
     index : int
-        Of the chosen candidate.
+        Of the chosen candidate; their number K, where the strategy has found a path of its own.
     seconds : float
         Wall time from the question to the index. It includes building the planner (factoring the prior), signatures, and the
         bounds and exact values without which the strategy cannot name an index. It excludes what is computed afterwards to
@@ -80,9 +84,15 @@ class Choice:
         """That of the planner, where the strategy is one of its own."""
         return self.reasons.decision
 
+    @property
+    def proposal(self) -> Way | None:
+        """The chosen path, where the strategy has found one of its own."""
+        return self.reasons.proposal
+
 
 Answer = tuple[int, Callable[[], Reasons]]
-"""The index of the chosen candidate, and what computes the reasons, which the seconds of a choice do not include."""
+"""The index of the chosen candidate (K for a path of its own, which the reasons hold), and what computes the reasons, which the
+seconds of a choice do not include."""
 
 
 class Strategy(Protocol):

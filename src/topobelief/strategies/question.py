@@ -3,20 +3,48 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from topobelief.arrays import FloatArray
 from topobelief.bounds.entropy_bounds import Determinant
+from topobelief.candidates.propose import CandidateRule
+from topobelief.candidates.roadmap import Roadmap
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.optional import has_kernels
 from topobelief.planning.planner import Planner
 from topobelief.planning.registry import default_signature, unit_of
+from topobelief.search.result import Way
+from topobelief.world import World
 
 
 def installed_bounds() -> str:
     """Bounds anchored in the prior where numba is installed, which compiles them; Fischer's otherwise."""
     return "anchored" if has_kernels() else "fischer"
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Ground:
+    """What the candidates of a question were found on, for strategies that look for a path themselves.
+
+    Attributes
+    ----------
+    roadmap
+        Paths begin at its first vertex and are joined to the last pose of the graph.
+    goal : shape (2,) or (3,)
+        Metres; a heading is ignored.
+    world
+    rule
+        By which the candidates' factors were predicted.
+    """
+
+    roadmap: Roadmap
+    goal: ArrayLike
+    world: World
+    rule: CandidateRule
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -35,6 +63,8 @@ class Question:
         Random numbers drawn by the caller; "random" takes the action with the largest. Strategies draw none themselves.
     objective, bounds, determinant
         As the planner takes them. Default of the bounds: `installed_bounds`.
+    ground
+        What the candidates were found on; only the strategy "roadmap" needs it.
     """
 
     graph: PoseGraph
@@ -44,6 +74,16 @@ class Question:
     objective: str
     bounds: str = field(default_factory=installed_bounds)
     determinant: Determinant = "cholesky"
+    ground: Ground | None = None
+
+    def joined_by(self, way: Way | None) -> Question:
+        """The same with the path that a strategy has found by itself as one more candidate, the last."""
+        if way is None:
+            return self
+        lengths = np.append(self.lengths, way.length)
+        return replace(
+            self, actions=[*self.actions, way.action], lengths=lengths, random_scores=np.append(self.random_scores, -np.inf)
+        )
 
     @property
     def unit(self) -> str:

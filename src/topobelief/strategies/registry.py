@@ -14,10 +14,12 @@ STRATEGIES = {
     **dict.fromkeys(SIGNATURES, "topobelief.strategies.by_bounds:by_bounds"),
     "optimum": "topobelief.strategies.optimum:optimum",
     "standard": "topobelief.strategies.standard:standard",
+    "roadmap": "topobelief.strategies.roadmap:roadmap",
     "shortest": "topobelief.strategies.shortest:shortest",
     "random": "topobelief.strategies.random_choice:random_choice",
 }
-"""Signatures rank; "optimum" proves which candidate is best; "standard" evaluates all; the last two ignore the graph."""
+"""Signatures rank; "optimum" proves which candidate is best; "standard" evaluates all; "roadmap" finds a path of its own; the
+last two ignore the graph."""
 
 _PATH_K = "topobelief.strategies.path_k:path_k"
 
@@ -35,6 +37,17 @@ def place_of(name: str) -> str:
     if re.fullmatch(r"path-(0|[1-9][0-9]*)", name):
         return _PATH_K
     raise InvalidInputError(f'expected a strategy of {", ".join(STRATEGIES)}, or path-0, path-1, …, got "{name}"')
+
+
+def proposes(name: str) -> bool:
+    """Whether a strategy finds a path of its own in place of choosing among candidates.
+
+    Examples
+    --------
+    >>> proposes("roadmap"), proposes("optimum")
+    (True, False)
+    """
+    return name == "roadmap"
 
 
 def checked_strategy(name: str) -> str:

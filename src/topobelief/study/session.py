@@ -20,7 +20,7 @@ from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.decision_quality import DecisionQuality, decision_quality
 from topobelief.planning.planner import Planner
 from topobelief.strategies.choose import choose
-from topobelief.strategies.question import Question
+from topobelief.strategies.question import Ground, Question
 from topobelief.study.tasks import Task
 
 TIE = 1e-6
@@ -63,9 +63,13 @@ def play(task: Task) -> Row:
     actions, lengths = found.actions, found.lengths
     rule = task.rule
     random_scores = task.rng.permutation(len(actions)).astype(np.float64)
-    question = Question(graph, actions, lengths, random_scores, task.objective, rule.bounds, rule.determinant)
+    of_candidates = replace(rule.candidates, information=task.noise.information, seed=task.seed)
+    ground = Ground(found.routes.roadmap, task.session.goals[last], task.world, of_candidates)
+    question = Question(graph, actions, lengths, random_scores, task.objective, rule.bounds, rule.determinant, ground=ground)
     choice = choose(task.strategy, question)
     reasons = choice.reasons
+    question = question.joined_by(choice.proposal)
+    actions, lengths = question.actions, question.lengths
     begin = time.perf_counter()
     values = question.values()
     spread = float(np.ptp(values))
