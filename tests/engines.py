@@ -11,9 +11,9 @@ from topobelief.arrays import FloatArray
 from topobelief.bounds.options import BoundOptions
 from topobelief.forms.of_graph import GraphForms
 from topobelief.forms.protocol import ClosureForms
+from topobelief.graph.action import landmark_ends
 from topobelief.graph.alignment import sample_of
 from topobelief.graph.fisher import fisher_rows
-from topobelief.linalg import laplacian_form
 from topobelief.linalg.estimate import Estimate
 from topobelief.linalg.extensions import Extensions
 from topobelief.planning.batch import Batch, Criteria
@@ -49,7 +49,7 @@ class Judge:
 def judge(
     graph, kind=IncrementalEngine, *, anchor=None, determinant="cholesky", window=2, sample_size=500, **criteria
 ) -> Judge:
-    engine = kind(graph, graph.num_poses - 1 if anchor is None else anchor, sample_size=sample_size)
+    engine = kind(graph, graph.last_pose if anchor is None else anchor, sample_size=sample_size)
     return Judge(engine, Criteria(options=BoundOptions(determinant, window), **criteria))
 
 
@@ -74,8 +74,9 @@ class DenseForms(GraphForms, ClosureForms[float]):
     def __init__(self, engine: DenseEngine, action) -> None:
         alone = engine.from_scratch(action)
         super().__init__(alone.graph, anchor=engine.anchor, prior=engine.graph, sample_size=engine.sample_size)
-        n, m = engine.graph.num_poses, engine.graph.num_edges
-        batch = Extensions.of(n, action.edges, np.array([0, len(action.edges)]), np.array([0, action.num_new_poses]))
+        n, m = engine.graph.num_nodes, engine.graph.num_edges
+        stems = ~landmark_ends(engine.graph, action.edges)
+        batch = Extensions.of(n, action.edges, np.array([0, len(action.edges)]), np.array([0, action.num_new_poses]), stems)
         rank = np.concatenate([np.zeros(n), 1 + np.argsort(batch.order)])  # along the path; 0 for poses that exist
         closures = m + np.flatnonzero(~batch.planted)
         self.in_base = np.concatenate([np.arange(m), m + np.flatnonzero(batch.planted)])
@@ -83,10 +84,11 @@ class DenseForms(GraphForms, ClosureForms[float]):
 
     def rows(self, name, held, edges=slice(None)):
         graph = self.graph
-        form = laplacian_form(graph.edges, self.weights[name == "trees_r"]) if "trees" in name else None
-        form = form or getattr(replace(fisher_rows(graph), weights=None), name)()
+        rows = replace(fisher_rows(graph), weights=None)
+        rotations = name == "trees_r"
+        form = rows.trees(self.weights[rotations], rotations=rotations) if "trees" in name else getattr(rows, name)()
         m, r, b = form.rows_i.shape
-        rows = np.zeros((m, r, graph.num_poses, b))
+        rows = np.zeros((m, r, graph.num_nodes, b))
         rows[np.arange(m), :, graph.edges[:, 0]], rows[np.arange(m), :, graph.edges[:, 1]] = form.rows_i, form.rows_j
         rows = np.delete(rows, held, axis=2)[edges]
         return rows.reshape(len(rows), r, rows.shape[2] * b)
@@ -128,13 +130,13 @@ class DenseForms(GraphForms, ClosureForms[float]):
 
     def mean_resistance(self):
         nodes = sample_of(self.num_existing, self._sample_size)
-        columns = np.zeros((self.graph.num_poses, 1, len(nodes)))
+        columns = np.zeros((self.graph.num_nodes, 1, len(nodes)))
         columns[nodes, 0] = np.eye(len(nodes)) - 1 / len(nodes)
         return Estimate(float(np.sum(columns * self.solved("trees_p", columns))) / len(nodes), 0.0)
 
     def projection(self, b):
         nodes, k = sample_of(self.num_existing, self._sample_size), self.split[0]
-        columns = np.zeros((self.graph.num_poses, b, len(nodes) * k))
+        columns = np.zeros((self.graph.num_nodes, b, len(nodes) * k))
         columns[nodes, :k] = alignment_reference(self._prior.positions[nodes]).reshape(len(nodes), k, -1)
         return columns, len(nodes)
 
@@ -146,7 +148,7 @@ class DenseForms(GraphForms, ClosureForms[float]):
         k = self.split[0]
         columns, count = self.projection(k)
         rows = self.rows("joint", [])
-        rows = rows.reshape(-1, self.graph.num_poses, self.tangent_dim)
+        rows = rows.reshape(-1, self.graph.num_nodes, self.tangent_dim)
         moved = np.einsum("xnr,xmp,mps->nrs", rows[:, :, k:], rows[:, :, :k], self.solved("positions", columns), optimize=True)
         return Estimate(float(np.sum(moved * self.solved(rotations, moved))) / count, 0.0)
 

@@ -25,8 +25,11 @@ from scipy.spatial.transform import Rotation
 from topobelief.arrays import FloatArray
 from topobelief.errors import EstimationError
 from topobelief.geometry import Group
-from topobelief.graph.information import scalar_weights
+from topobelief.graph.information import cholesky_roots, scalar_weights
+from topobelief.graph.observations import observations_by_kind, observed_residuals, roots_of_positions, seen_positions
 from topobelief.graph.pose_graph import PoseGraph
+from topobelief.graph.readings import BEARING_RANGE, POSITION
+from topobelief.graph.well_posed import require_determined
 from topobelief.linalg.least_squares import LeastSquaresSolver
 
 _CONVERGED = 1e-10  # fall of chi^2 that the linear model still promises: 1e-5 standard deviations from the minimum
@@ -67,15 +70,32 @@ def optimize(graph: PoseGraph, *, max_iterations: int = 300) -> PoseGraph:
     >>> np.allclose(optimize(square).positions, [[0, 0], [1, 0], [1, 1], [0, 1]])
     True
     """
-    graph.topology.require_connected(names=graph.ids)
+    require_determined(graph, anchor=int(graph.pose_indices[0]))
     problem = _Problem(graph)
     found: PoseGraph | None = None
     with suppress(EstimationError):  # the search may still succeed from the given poses
-        found = graph.with_poses(problem.minimum_from(problem.chordal_start(), max_iterations))
+        start = problem.chordal_start() if problem.linear else _start_by_positions(graph, max_iterations)
+        if start is not None:
+            found = graph.with_poses(problem.minimum_from(start, max_iterations))
     if found is not None and found.chi2 <= graph.chi2:
         return found
     refined = graph.with_poses(problem.minimum_from(graph.poses, max_iterations))
     return min((candidate for candidate in (graph, found, refined) if candidate is not None), key=lambda each: each.chi2)
+
+
+def _start_by_positions(graph: PoseGraph, max_iterations: int) -> FloatArray | None:
+    """The estimate with bearings and ranges taken for positions; None where a reading is not both."""
+    kinds = observations_by_kind(graph.reading_codes)
+    if any(not kind.linear and kind is not BEARING_RANGE for kind, _ in kinds):
+        return None
+    k, noise, readings = graph.group.position_dim, graph.noise.copy(), graph.readings
+    for kind, which in kinds:
+        if not kind.linear:
+            jacobian = kind.jacobian(graph.measurements[which, :k])
+            noise[which, :k, :k] = jacobian.transpose(0, 2, 1) @ noise[which, :k, :k] @ jacobian
+            readings[which] = POSITION.name
+    as_positions = PoseGraph(graph.poses, graph.edges, graph.measurements, noise, graph.kinds, ids=graph.ids, readings=readings)
+    return optimize(as_positions, max_iterations=max_iterations).poses
 
 
 class _Problem:
@@ -89,9 +109,23 @@ class _Problem:
         self.group = graph.group
         self.tails, self.heads = graph.edges.T
         self.measured_rotations = self.group.rotation_matrix(graph.measurements)
-        self.roots = np.linalg.cholesky(graph.information).transpose(0, 2, 1)
-        self.pose_solver = LeastSquaresSolver(graph.edges, graph.num_poses, graph.tangent_dim, held=0)
-        self.position_solver = LeastSquaresSolver(graph.edges, graph.num_poses, self.group.position_dim, held=0)
+        self.observing = np.flatnonzero(graph.reading_codes)
+        self.linear = all(kind.linear for kind, _ in observations_by_kind(graph.reading_codes))
+        self.roots = self._roots()
+        self.held = int(graph.pose_indices[0])
+        self.pose_solver = LeastSquaresSolver(graph.edges, graph.num_nodes, graph.tangent_dim, held=self.held)
+        self.position_solver = LeastSquaresSolver(graph.edges, graph.num_nodes, self.group.position_dim, held=self.held)
+
+    def _roots(self) -> FloatArray:
+        """Of the noise, observations with rows of positions alone."""
+        k, noise = self.group.position_dim, self.graph.noise
+        if not self.observing.size:
+            return cholesky_roots(noise)
+        between = np.flatnonzero(self.graph.reading_codes == 0)
+        roots = np.zeros(noise.shape)
+        roots[between] = cholesky_roots(noise[between])
+        roots[self.observing, :k, :k] = roots_of_positions(noise[self.observing, :k, :k])[0]
+        return roots
 
     def chordal_start(self) -> FloatArray:
         """Poses with the rotations of the chordal relaxation, all at the position of the first."""
@@ -100,13 +134,15 @@ class _Problem:
         weights = np.sqrt(scalar_weights(graph.information)[1])[:, None, None]
         rows_i = -weights * self.measured_rotations.transpose(0, 2, 1)  # R_j^T = R_ij^T R_i^T
         rows_j = weights * np.eye(k)
-        transposed = np.zeros((graph.num_poses, k, k))
-        transposed[0] = group.rotation_matrix(graph.poses[0]).T
+        rows_j[graph.carries_pad] = np.eye(k)  # landmarks, which have no rotation, stay as they are
+        transposed = np.zeros((graph.num_nodes, k, k))
+        transposed[self.held] = group.rotation_matrix(graph.poses[self.held]).T
         residuals = rows_i @ transposed[self.tails] + rows_j @ transposed[self.heads]
         transposed += _solved(self.position_solver, rows_i, rows_j, residuals)[0]
         rotations = _nearest_rotations(transposed.transpose(0, 2, 1))
-        poses = _pose_rows(group, np.tile(graph.positions[0], (graph.num_poses, 1)), rotations)
-        poses[0] = graph.poses[0]
+        poses = _pose_rows(group, np.tile(graph.positions[self.held], (graph.num_nodes, 1)), rotations)
+        poses[self.held] = graph.poses[self.held]
+        poses[graph.is_landmark, k:] = group.identity()[k:]
         return poses
 
     def minimum_from(self, poses: FloatArray, max_iterations: int) -> FloatArray:
@@ -140,7 +176,9 @@ class _Problem:
         )
 
     def _settled(self, poses: FloatArray) -> FloatArray:
-        """The same rotations with the positions that minimise chi^2 for them."""
+        """The same rotations with the positions that minimise chi^2 for them, where that is a linear problem."""
+        if not self.linear:
+            return poses
         k = self.group.position_dim
         _, residuals = self._residuals(poses)
         turn = self.group.rotation_matrix(poses[self.tails]) @ self.measured_rotations
@@ -155,6 +193,11 @@ class _Problem:
         predicted = self.group.between(poses[self.tails], poses[self.heads])
         errors = self.group.between(self.graph.measurements, predicted)
         tangent = np.concatenate([self.group.position(errors), self.group.rotation_vector(errors)], axis=1)
+        if self.observing.size:
+            k, seen = self.group.position_dim, self.group.position(predicted[self.observing])
+            tangent[self.observing] = 0.0
+            measured, codes = self.graph.measurements[self.observing, :k], self.graph.reading_codes[self.observing]
+            tangent[self.observing, :k] = observed_residuals(measured, seen, codes)
         return errors, (self.roots @ tangent[:, :, None])[:, :, 0]
 
     def _rows(self, poses: FloatArray, errors: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -167,8 +210,21 @@ class _Problem:
         jacobian = np.zeros_like(self.roots)
         jacobian[:, :k, :k] = self.group.rotation_matrix(errors)
         jacobian[:, k:, k:] = _inverse_right_jacobian(self.group, self.group.rotation_vector(errors))
+        if self.observing.size:
+            self._observe(poses, jacobian)
         rows_j = self.roots @ jacobian
-        return -rows_j @ self.group.adjoint(self.group.between(poses[self.heads], poses[self.tails])), rows_j
+        rows_i = -rows_j @ self.group.adjoint(self.group.between(poses[self.heads], poses[self.tails]))
+        rows_j[self.graph.carries_pad, k:, k:] = np.eye(self.group.rotation_dim)
+        return rows_i, rows_j
+
+    def _observe(self, poses: FloatArray, jacobian: FloatArray) -> None:
+        """Enter the Jacobians of readings: the position that a pose sees moves by R_i^T v where the point moves by v."""
+        k = self.group.position_dim
+        for kind, which in observations_by_kind(self.graph.reading_codes):
+            read = kind.jacobian(seen_positions(self.group, poses, self.graph.edges[which]))
+            turn = self.group.rotation_matrix(poses[self.tails[which]]).transpose(0, 2, 1)
+            jacobian[which] = 0.0
+            jacobian[which, : read.shape[1], :k] = read @ turn
 
 
 def _solved(

@@ -21,6 +21,7 @@ from topobelief.graph.alignment import DEFAULT_SAMPLE_SIZE, Alignment, checked_s
 from topobelief.graph.fisher import fisher_rows
 from topobelief.graph.fit import warn_of_misfit
 from topobelief.graph.pose_graph import PoseGraph
+from topobelief.graph.well_posed import require_determined
 from topobelief.linalg.estimate import Estimate
 from topobelief.linalg.inverse_traces import inverse_traces
 
@@ -86,25 +87,26 @@ def expected_errors(
     """
     alignment = Alignment.of(graph.positions, checked_sample_size(sample_size))
     after = graph if action is None else posterior(graph, action)
-    after.topology.require_connected(names=after.ids)
+    start = int(after.pose_indices[0])
+    require_determined(after, anchor=start)
     kappa = graph.tangent_dim
-    goal = after.num_poses - 1
-    ends = np.unique([0, goal])
+    goal = after.last_pose
+    ends = np.unique([start, goal])
     square, variance = inverse_traces(
         fisher_rows(after).joint(),
-        after.num_poses,
-        [(alignment.nodes, alignment.columns(kappa)), (ends, _relative_position(after, goal)[: len(ends)])],
+        after.num_nodes,
+        [(alignment.nodes, alignment.columns(kappa)), (ends, _relative_position(after, start, goal)[: len(ends)])],
     )
     map_rmse = (1 / alignment.count * square).root().known_length("expected error of the map")
-    goal_std = variance.root().known_length("standard deviation of the last pose") if goal else Estimate(0.0, 0.0)
+    goal_std = variance.root().known_length("standard deviation of the last pose") if goal > start else Estimate(0.0, 0.0)
     warn_of_misfit(graph)
     return ExpectedErrors(map_rmse.value, goal_std.value)
 
 
-def _relative_position(graph: PoseGraph, goal: int) -> FloatArray:
-    """Columns on the first pose and on `goal`, shape (2, kappa, k): the position of `goal` seen from the first pose."""
+def _relative_position(graph: PoseGraph, start: int, goal: int) -> FloatArray:
+    """Columns on two poses, shape (2, kappa, k): the position of `goal` seen from `start`."""
     k, kappa = graph.group.position_dim, graph.tangent_dim
     columns = np.zeros((2, kappa, k))
-    lever = graph.group.lever(graph.positions[goal : goal + 1] - graph.positions[:1])[0]
+    lever = graph.group.lever(graph.positions[[goal]] - graph.positions[[start]])[0]
     columns[0, :k], columns[0, k:], columns[1, :k] = -np.eye(k), lever.T, np.eye(k)
     return columns

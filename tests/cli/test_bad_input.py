@@ -33,7 +33,7 @@ def files(tmp_path: Path) -> Path:
     (tmp_path / "folder.g2o").mkdir()
     (tmp_path / "disconnected.g2o").write_text(DISCONNECTED)
     (tmp_path / "map.yaml").write_text("image: map.pgm\n")
-    (tmp_path / "landmarks.g2o").write_text("VERTEX_XY 7 1 2\n" + DISCONNECTED)
+    (tmp_path / "planes.g2o").write_text("VERTEX_PLANE 7 0 0 1 2\n" + DISCONNECTED)
     (tmp_path / "islands.g2o").write_text("EDGE_SE2 1 2 1 0 0 1 0 0 1 0 1\nEDGE_SE2 3 4 1 0 0 1 0 0 1 0 1\n")
     (tmp_path / "truncated.g2o").write_text("VERTEX_SE2 0 0 0 0\nEDGE_SE2 0 1 1 0\n")
     return tmp_path
@@ -50,7 +50,10 @@ def files(tmp_path: Path) -> Path:
         ("truncated.g2o", "truncated.g2o:2: expected"),
         ("islands.g2o", "add the missing edges or keep one component, with --component largest"),
         ("map.yaml", "map.yaml:1: expected VERTEX_SE2, EDGE_SE2, VERTEX_SE3:QUAT, EDGE_SE3:QUAT, VERTEX2, EDGE2 or FIX"),
-        ("landmarks.g2o", "landmarks.g2o:1: expected poses and plain edges between them, got landmarks (VERTEX_XY on line 1)"),
+        (
+            "planes.g2o",
+            "planes.g2o:1: expected poses and plain edges between them, got planes or lines (VERTEX_PLANE on line 1)",
+        ),
     ],
 )
 def test_graph_files_that_are_wrong(topobelief, files, command, name, message):

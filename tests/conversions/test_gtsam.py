@@ -196,8 +196,8 @@ def test_what_is_no_pose_graph_is_refused(case: str):
 
 def test_values_that_are_no_poses_are_refused():
     values = gtsam.Values()
-    values.insert(3, np.zeros(2))
-    with pytest.raises(InvalidInputError, match="expected values of type Pose2 or Pose3, got another at 3"):
+    values.insert(3, 1.0)
+    with pytest.raises(InvalidInputError, match="expected values of type Pose2, Pose3, Point2 or Point3, got another at 3"):
         from_gtsam(gtsam.NonlinearFactorGraph(), values)
     with pytest.raises(InvalidInputError, match="expected at least one value, got none"):
         from_gtsam(gtsam.NonlinearFactorGraph(), gtsam.Values())

@@ -120,7 +120,7 @@ def test_one_pose_is_a_graph():
         ),
         (
             (LINE, CHAIN, None, EYE, ["pose", "landmark", "pose"]),
-            'expected every kind to be "pose"; landmarks are not supported',
+            r"expected an observation to lead from a pose to a landmark, got edge 1 = \(1, 2\) from a landmark",
         ),
         ((LINE, CHAIN, None, EYE, ["pose"] * 7), "kind"),
     ],

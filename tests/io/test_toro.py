@@ -59,7 +59,8 @@ def test_fix_lines_comments_and_missing_poses_work_as_in_g2o(filed):
         ("VERTEX3 5 0 0 0 0 0 0", "got VERTEX3: 3D TORO files are not supported"),
         ("EDGE3 0 1 0 0 0 0 0 0", "got EDGE3: 3D TORO files are not supported"),
         ("EQUIV 0 1", "got pairs of poses that are to be merged into one (EQUIV on line 3)"),
-        ("BR 0 7 1 2 3 4", "got landmarks (BR on line 3)"),
+        ("BR 0 7 1 -2 3 4", "expected a range and standard deviations above 0 for BR, got others"),
+        ("LANDMARK 0 7 1 2 1 0 0", "expected a positive definite covariance for LANDMARK, got another"),
         ("EDGE_SE2 0 1 1 2 0.5 1 0 0 1 0 1", "expected VERTEX2, EDGE2 or FIX, got EDGE_SE2: it belongs to the format g2o"),
     ],
 )

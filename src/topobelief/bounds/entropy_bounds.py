@@ -13,7 +13,7 @@ from topobelief.entropy import entropy_of
 from topobelief.errors import require_choice
 from topobelief.forms.of_graph import GraphForms
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.graph.topology import checked_anchor
+from topobelief.graph.well_posed import chosen_anchor, require_connected_poses, require_determined
 
 Family = Literal["paper", "fischer", "fischer_step"]
 
@@ -32,7 +32,7 @@ class Bounds:
 
 
 def entropy_bounds(
-    graph: PoseGraph, *, family: Family = "fischer", determinant: Determinant = "cholesky", anchor: int = 0
+    graph: PoseGraph, *, family: Family = "fischer", determinant: Determinant = "cholesky", anchor: int | None = None
 ) -> Bounds:
     """Bounds of the joint entropy J that need no factorisation of the full information matrix.
 
@@ -46,7 +46,8 @@ def entropy_bounds(
     determinant
         "cholesky": exact determinant in the lower bound. "hadamard": product of its diagonal, cheaper and looser.
     anchor
-        Pose that is held. J and the upper bound of J do not depend on it; the lower bound does, and holds for any.
+        Pose that is held, by default the first one. J and the upper bound of J do not depend on it; the lower bound does, and
+        holds for any.
 
     Returns
     -------
@@ -66,11 +67,11 @@ def entropy_bounds(
     """
     require_choice("family", family, _FAMILIES)
     options = BoundOptions(determinant)
-    anchor = checked_anchor(graph.num_poses, anchor)
-    graph.topology.require_connected(anchor=anchor, names=graph.ids)
+    anchor = chosen_anchor(graph, anchor)
+    require_determined(graph, anchor=anchor)
+    require_connected_poses(graph, anchor=anchor)
     forms = GraphForms(graph, anchor=anchor)
     low, high = (
-        entropy_of(log_det, forms.num_free, forms.tangent_dim, what="bound of the joint entropy")
-        for log_det in _FAMILIES[family](forms, options)
+        entropy_of(log_det, forms.dimension, what="bound of the joint entropy") for log_det in _FAMILIES[family](forms, options)
     )
     return Bounds(high.value - high.error, low.value + low.error)

@@ -19,6 +19,7 @@ from topobelief.forms.protocol import Forms
 from topobelief.graph.information import SAME_NOISE, isotropic_weights
 from topobelief.linalg.estimate import Estimate, Number
 from topobelief.signatures.spanning_trees import weighted_trees
+from topobelief.wording import counted
 
 
 def paper(forms: Forms[Number], options: BoundOptions) -> tuple[Estimate[Number], Estimate[Number]]:
@@ -27,13 +28,29 @@ def paper(forms: Forms[Number], options: BoundOptions) -> tuple[Estimate[Number]
     Raises
     ------
     InvalidGraphError
-        Where the noise is not one block-isotropic Omega on all edges.
+        Where the noise is not one block-isotropic Omega on all edges, or there are landmarks.
     """
+    require_poses_alone(int(np.count_nonzero(forms.landmarks)))
     _require_equal_weights(forms.weights, isotropic=forms.isotropic)
     k, q = forms.split
     determinant = forms.hadamard if options.hadamard else forms.log_det
     shifted = determinant("trees_r", shift=forms.largest_lever_sum())
     return weighted_trees(forms), float(k) * forms.log_det("trees_p") + float(q) * shifted
+
+
+def require_poses_alone(num_landmarks: int) -> None:
+    """Raise where there are landmarks.
+
+    Raises
+    ------
+    InvalidGraphError
+        The paper derives its bounds for relative poses.
+    """
+    if num_landmarks:
+        raise InvalidGraphError(
+            f"the paper's bounds expect a graph of poses alone, got {counted(num_landmarks, 'landmark')}, "
+            'which have no rotations; use family="fischer"'
+        )
 
 
 def require_equal_noise(information: FloatArray) -> None:

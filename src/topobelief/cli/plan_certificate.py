@@ -41,9 +41,7 @@ def say_search(
         reporter.say(certificate(searched, limits), front_table(found, POINTS_TOLD, names=searched.names))
 
 
-def headline(
-    searched: Searched, decision: Decision, errors: PlanErrors, goals: Sequence[Goal], limits: Limits
-) -> str:
+def headline(searched: Searched, decision: Decision, errors: PlanErrors, goals: Sequence[Goal], limits: Limits) -> str:
     """What to drive, and what that does to the map."""
     if searched.has_goal:
         return answer(searched.proposals, decision, errors, goals)

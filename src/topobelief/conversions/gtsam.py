@@ -1,4 +1,4 @@
-"""Pose graphs to and from GTSAM (gtsam.org): between factors and values.
+"""Pose graphs to and from GTSAM (gtsam.org): between factors, observations of landmarks, and values.
 
 GTSAM orders the tangent of Pose3 (rotation, translation), we (translation, rotation); in the plane both put the
 translation first. It takes the whole logarithm of an error for its residual where `Group.residual` takes the translation as it
@@ -13,10 +13,13 @@ from typing import Any
 import numpy as np
 
 from topobelief.arrays import FloatArray
+from topobelief.conversions.gtsam_landmarks import observation_factor, observation_of
 from topobelief.errors import InvalidInputError, ReadingWarning
-from topobelief.geometry import SE2_GROUP, group_of_size
+from topobelief.geometry import SE2_GROUP, SE3_GROUP, group_of_size
 from topobelief.graph.action import Action, posterior
 from topobelief.graph.pose_graph import PoseGraph
+from topobelief.graph.readings import READING_KINDS, RELATIVE_POSE
+from topobelief.graph.variable_kinds import LANDMARK, POSE
 from topobelief.optional import load
 from topobelief.symbols import id_of_key, key_of_id
 from topobelief.wording import counted
@@ -37,8 +40,15 @@ def to_gtsam(graph: PoseGraph) -> tuple[Any, Any]:
     Returns
     -------
     factors : gtsam.NonlinearFactorGraph
-        One BetweenFactorPose2 or BetweenFactorPose3 per edge, in the order of the edges.
+        One BetweenFactorPose2 or BetweenFactorPose3 per edge, in the order of the edges; for an observation of a landmark one
+        BearingRangeFactor, RangeFactor or BearingFactor, 2D or 3D. A position becomes a bearing and a range.
     values : gtsam.Values
+        Landmarks as Point2 or Point3.
+
+    Raises
+    ------
+    InvalidInputError
+        If a landmark is seen at the position of the pose.
     """
     return _factors_and_values(graph, first_pose=0, first_edge=0)
 
@@ -67,7 +77,7 @@ def action_to_gtsam(graph: PoseGraph, action: Action) -> tuple[Any, Any]:
     InvalidActionError
         If the action does not fit the graph.
     """
-    return _factors_and_values(posterior(graph, action), first_pose=graph.num_poses, first_edge=graph.num_edges)
+    return _factors_and_values(posterior(graph, action), first_pose=graph.num_nodes, first_edge=graph.num_edges)
 
 
 def _factors_and_values(graph: PoseGraph, *, first_pose: int, first_edge: int) -> tuple[Any, Any]:
@@ -76,14 +86,23 @@ def _factors_and_values(graph: PoseGraph, *, first_pose: int, first_edge: int) -
     planar = graph.group is SE2_GROUP
     between = gtsam.BetweenFactorPose2 if planar else gtsam.BetweenFactorPose3
     order = np.arange(3) if planar else _ROTATION_FIRST
-    information = np.ascontiguousarray(graph.information[first_edge:, order][:, :, order])
+    information = np.ascontiguousarray(graph.noise[first_edge:, order][:, :, order])
+    k, kinds = graph.group.position_dim, {kind.name: kind for kind in READING_KINDS}
     factors, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
     keys = [key_of_id(node) for node in graph.ids.tolist()]
-    for key, pose in zip(keys[first_pose:], graph.poses[first_pose:].tolist(), strict=True):
-        values.insert(key, _to_pose(gtsam, pose))
+    for node, key in enumerate(keys[first_pose:], start=first_pose):
+        pose = graph.poses[node]
+        values.insert(key, np.array(pose[:k]) if graph.is_landmark[node] else _to_pose(gtsam, pose.tolist()))
     edges, measurements = graph.edges[first_edge:].tolist(), graph.measurements[first_edge:].tolist()
-    for (i, j), measured, matrix in zip(edges, measurements, information, strict=True):
-        factors.add(between(keys[i], keys[j], _to_pose(gtsam, measured), gtsam.noiseModel.Gaussian.Information(matrix)))
+    readings = graph.readings[first_edge:].tolist()
+    for e, ((i, j), measured, matrix, reading) in enumerate(zip(edges, measurements, information, readings, strict=True)):
+        if reading == RELATIVE_POSE:
+            noise = gtsam.noiseModel.Gaussian.Information(matrix)
+            factors.add(between(keys[i], keys[j], _to_pose(gtsam, measured), noise))
+            continue
+        d = kinds[reading].dimension(k)
+        read = graph.noise[first_edge + e, :d, :d]
+        factors.add(observation_factor(gtsam, keys[i], keys[j], np.array(measured[:k]), read, reading))
     return factors, values
 
 
@@ -96,12 +115,13 @@ def from_gtsam(factors: Any, values: Any = None) -> PoseGraph:
     Parameters
     ----------
     factors : gtsam.NonlinearFactorGraph or gtsam.ISAM2
-        BetweenFactorPose2 or BetweenFactorPose3 with Gaussian or robust noise. A robust factor is taken for the Gaussian of its
-        weight at the values, w times its information, and left out where w is below 1e-6; a `ReadingWarning` says so. One prior
-        on one pose is allowed and left out: it only says where the graph lies, on which no quantity depends. Slots of removed
-        factors are skipped. An ISAM2 stands for its factors and its estimate.
+        BetweenFactorPose2 or BetweenFactorPose3, and BearingRangeFactor, RangeFactor and BearingFactor from poses to points (2D
+        or 3D), with Gaussian or robust noise. The latter keep their Jacobians: see `readings` of `PoseGraph`. A robust factor
+        is taken for the Gaussian of its weight at the values, w times its information, and left out where w is below 1e-6; a
+        `ReadingWarning` says so. One prior on one pose is allowed and left out: it only says where the graph lies, on which no
+        quantity depends. Slots of removed factors are skipped. An ISAM2 stands for its factors and its estimate.
     values : gtsam.Values, optional
-        A pose for every key of the factors; keys may be any. Only an ISAM2 needs none.
+        A pose or a point for every key of the factors; keys may be any. Only an ISAM2 needs none.
 
     Raises
     ------
@@ -116,11 +136,14 @@ def from_gtsam(factors: Any, values: Any = None) -> PoseGraph:
         factors, values = factors.getFactorsUnsafe(), factors.calculateEstimate()
     _require_factors_and_values(gtsam, factors, values)
     keys: list[int] = sorted(values.keys())
+    found = {key: _value(gtsam, values, key) for key in keys}
+    keys.sort(key=lambda key: (found[key][1], key))  # poses first
     index_of = {key: index for index, key in enumerate(keys)}
-    poses = [_value(gtsam, values, key) for key in keys]
+    poses, is_point = [found[key][0] for key in keys], [found[key][1] for key in keys]
     edges: list[tuple[int, int]] = []
     measurements: list[FloatArray] = []
     information: list[FloatArray] = []
+    readings: list[str] = []
     weights: list[float] = []  # of robust factors
     num_priors = 0
     for number in range(factors.size()):
@@ -130,10 +153,11 @@ def from_gtsam(factors: Any, values: Any = None) -> PoseGraph:
         if isinstance(factor, gtsam.PriorFactorPose2 | gtsam.PriorFactorPose3) and num_priors == 0:
             num_priors = 1
             continue
-        if not isinstance(factor, gtsam.BetweenFactorPose2 | gtsam.BetweenFactorPose3):
+        seen = observation_of(gtsam, factor)
+        if seen is None and not isinstance(factor, gtsam.BetweenFactorPose2 | gtsam.BetweenFactorPose3):
             raise InvalidInputError(
-                "expected BetweenFactorPose2 or BetweenFactorPose3 and at most one prior, "
-                f"got {type(factor).__name__} as factor {number}"
+                "expected BetweenFactorPose2 or BetweenFactorPose3, factors of bearing and range from a pose to a point, "
+                f"and at most one prior, got {type(factor).__name__} as factor {number}"
             )
         i, j = factor.keys()
         if i not in index_of or j not in index_of:
@@ -146,8 +170,11 @@ def from_gtsam(factors: Any, values: Any = None) -> PoseGraph:
             if weight < _LEAST_WEIGHT:
                 continue
         edges.append((index_of[i], index_of[j]))
-        measurements.append(_from_pose(gtsam, factor.measured()))
-        information.append(weight * _information(gtsam, noise, number))
+        matrix = weight * _information(gtsam, noise, number)
+        measured = _from_pose(gtsam, factor.measured()) if seen is None else _pose_at(seen[1])
+        measurements.append(measured)
+        information.append(matrix if seen is None else _filled(matrix, group_of_size(len(measured)).tangent_dim))
+        readings.append(RELATIVE_POSE if seen is None else seen[0].name)
     if weights:
         warnings.warn(_robust_note(weights), ReadingWarning, stacklevel=2)
     if len({len(pose) for pose in poses + measurements}) > 1:
@@ -160,7 +187,9 @@ def from_gtsam(factors: Any, values: Any = None) -> PoseGraph:
         np.array(edges, dtype=np.int64),
         np.array(measurements).reshape(-1, len(poses[0])),
         np.array(information) if information else identity,
+        np.where(is_point, LANDMARK.name, POSE.name) if any(is_point) else None,
         ids=np.array([id_of_key(key) for key in keys], dtype=np.int64),
+        readings=readings if any(is_point) else None,
     )
 
 
@@ -210,14 +239,35 @@ def _information(gtsam: Any, noise: Any, number: int) -> FloatArray:
     if not isinstance(noise, gtsam.noiseModel.Gaussian) or noise.isConstrained():
         raise InvalidInputError(f"expected Gaussian or robust noise, got {type(noise).__name__} on factor {number}")
     matrix = np.asarray(noise.information(), dtype=np.float64)
-    order = np.arange(3) if len(matrix) == SE2_GROUP.tangent_dim else _ROTATION_FIRST
+    order = _ROTATION_FIRST if len(matrix) == SE3_GROUP.tangent_dim else np.arange(len(matrix))
     return (matrix + matrix.T)[np.ix_(order, order)] / 2
 
 
-def _value(gtsam: Any, values: Any, key: int) -> FloatArray:
+def _value(gtsam: Any, values: Any, key: int) -> tuple[FloatArray, bool]:
+    """A value as a pose, and whether it is a point."""
     for at in (values.atPose2, values.atPose3):
         try:
-            return _from_pose(gtsam, at(key))
+            return _from_pose(gtsam, at(key)), False
         except RuntimeError:  # the value is of another type
             continue
-    raise InvalidInputError(f"expected values of type Pose2 or Pose3, got another at {gtsam.DefaultKeyFormatter(key)}")
+    for at in (values.atPoint2, values.atPoint3):
+        try:
+            return _pose_at(np.asarray(at(key), dtype=np.float64)), True
+        except RuntimeError:
+            continue
+    raise InvalidInputError(
+        f"expected values of type Pose2, Pose3, Point2 or Point3, got another at {gtsam.DefaultKeyFormatter(key)}"
+    )
+
+
+def _pose_at(point: FloatArray) -> FloatArray:
+    """The pose at a point that is not turned."""
+    group = SE2_GROUP if len(point) == SE2_GROUP.position_dim else SE3_GROUP
+    return np.concatenate([point, group.identity()[len(point) :]])
+
+
+def _filled(matrix: FloatArray, size: int) -> FloatArray:
+    """A matrix as the first block of a larger one, the rest zero."""
+    filled = np.zeros((size, size))
+    filled[: len(matrix), : len(matrix)] = matrix
+    return filled

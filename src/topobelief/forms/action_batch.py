@@ -7,12 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
-from topobelief.arrays import FloatArray, IntArray
+from topobelief.arrays import BoolArray, FloatArray, IntArray
 from topobelief.forms.of_topology import weights_of
-from topobelief.graph.action import Action
-from topobelief.graph.fisher import FisherRows, fisher_rows
+from topobelief.graph.action import Action, landmark_ends
+from topobelief.graph.fisher import FisherRows, rows_between
+from topobelief.graph.information import of_positions
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.graph.topology import Topology
 from topobelief.linalg.extensions import Extensions
 
 
@@ -64,10 +64,11 @@ class ActionBatch:
     @cached_property
     def extensions(self) -> Extensions:
         """The same edges, with new poses counted through the batch."""
-        n, node_start = self.graph.num_poses, np.concatenate([[0], np.cumsum(self.num_new)])
+        n, node_start = self.graph.num_nodes, np.concatenate([[0], np.cumsum(self.num_new)])
         shift = np.repeat(node_start[:-1], self.num_edges)[:, None]
         edges = np.where(self.edges >= n, self.edges + shift, self.edges)
-        return Extensions.of(n, edges, self.edge_start, node_start)
+        stems = None if self.marks is None else ~self.marks[0]
+        return Extensions.of(n, edges, self.edge_start, node_start, stems)
 
     @cached_property
     def information(self) -> FloatArray:
@@ -78,18 +79,27 @@ class ActionBatch:
             return np.zeros((0, kappa, kappa))  # actions without edges need not know kappa
         firsts = np.stack([each[0] for each in matrices])
         if all(each.strides[0] == 0 for each in matrices) and (firsts == firsts[0]).all():
-            return np.broadcast_to(firsts[0], (int(self.num_edges.sum()), kappa, kappa))
-        return np.concatenate(matrices)
+            together = np.broadcast_to(firsts[0], (int(self.num_edges.sum()), kappa, kappa))
+        else:
+            together = np.concatenate(matrices)
+        return together if self.marks is None else of_positions(together, self.marks[0])
 
     @cached_property
     def rows(self) -> FisherRows:
         """Whitened rows of all edges."""
-        edges = self.extensions.edges
         poses = np.concatenate([self.graph.poses, *(action.poses for action in self.actions if action.num_new_poses)])
-        stacked = PoseGraph._from_checked(  # pyright: ignore[reportPrivateUsage]
-            Topology(len(poses), edges), poses, np.zeros((0, 0)), self.information, np.zeros(0, np.int64), ()
-        )
-        return fisher_rows(stacked)
+        marks = None
+        if self.graph.num_landmarks:
+            new = np.zeros(len(poses) - self.graph.num_nodes, dtype=np.bool_)
+            marks = np.concatenate([self.graph.is_landmark, new]), np.zeros(len(self.edges), dtype=np.bool_)
+        return rows_between(self.graph.group, poses, self.extensions.edges, self.information, marks)
+
+    @cached_property
+    def marks(self) -> tuple[BoolArray, BoolArray | None] | None:
+        """Which edges lead to landmarks, and that none carries a pad, for the prior's do; None without landmarks."""
+        if not self.graph.num_landmarks:
+            return None
+        return landmark_ends(self.graph, self.edges), None
 
     @cached_property
     def scalar_weights(self) -> tuple[FloatArray, FloatArray]:

@@ -13,6 +13,7 @@ from topobelief.forms.action_batch import ActionBatch
 from topobelief.forms.prior_factors import PriorFactors, SolvedName, form_of
 from topobelief.forms.protocol import ClosureForms, FormName, Forms, Part, PositionsName, RotationsName, Rows
 from topobelief.graph.action import posterior
+from topobelief.graph.information import log_dets_of_noise
 from topobelief.graph.topology import Topology
 from topobelief.linalg.elimination_paths import FormFactor
 from topobelief.linalg.estimate import UNIT_ROUNDOFF, Estimate
@@ -52,7 +53,11 @@ class IncrementalForms(Forms[FloatArray], ClosureForms[FloatArray]):
 
     @property
     def num_existing(self) -> int:
-        return self._prior.graph.num_poses
+        return self._prior.graph.num_nodes
+
+    @property
+    def landmarks(self) -> BoolArray:
+        return self._prior.graph.is_landmark
 
     @property
     def num_new(self) -> FloatArray:
@@ -65,7 +70,7 @@ class IncrementalForms(Forms[FloatArray], ClosureForms[FloatArray]):
         return self._prior.degrees.of_extensions(self._batch.edges, self._batch.edge_start, self._batch.num_new)
 
     def mean_log_noise(self) -> FloatArray:
-        total = self._prior.log_noise + self._batch.sums(np.linalg.slogdet(self._batch.information)[1])
+        total = self._prior.log_noise + self._batch.sums(log_dets_of_noise(self._batch.information))
         return total / np.maximum(self._prior.graph.num_edges + self._batch.num_edges, 1)
 
     @property

@@ -9,14 +9,14 @@ from functools import cached_property
 
 import numpy as np
 
-from topobelief.arrays import FloatArray
+from topobelief.arrays import BoolArray, FloatArray
 from topobelief.forms.of_topology import mean_log_noise, mean_resistance, weights_of
 from topobelief.forms.protocol import FormName, Forms, Part, PositionsName, RotationsName
 from topobelief.graph.alignment import DEFAULT_SAMPLE_SIZE, Alignment, sample_of
 from topobelief.graph.fisher import FisherRows, fisher_rows
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.graph.topology import Topology
-from topobelief.linalg import EdgeForm, Estimate, LogDetSolver, laplacian_form
+from topobelief.linalg import EdgeForm, Estimate, LogDetSolver
 from topobelief.linalg.inverse import InverseSolver, Solutions
 from topobelief.linalg.inverse_traces import inverse_traces
 from topobelief.linalg.shear import moved_rotations, sheared_log_det
@@ -62,11 +62,15 @@ class GraphForms(Forms[float]):
 
     @property
     def num_existing(self) -> int:
-        return self._prior.num_poses
+        return self._prior.num_nodes
+
+    @property
+    def landmarks(self) -> BoolArray:
+        return self._prior.is_landmark
 
     @property
     def num_new(self) -> float:
-        return float(self.graph.num_poses - self._prior.num_poses)
+        return float(self.graph.num_nodes - self._prior.num_nodes)
 
     def of_topology(self, quantity: Callable[[Topology], float]) -> float:
         return quantity(self.graph.topology)
@@ -102,11 +106,11 @@ class GraphForms(Forms[float]):
         return self._solver(self.anchor).hadamard(self._form(form, self._rows), shift=shift)
 
     def sheared_rotations(self, step: float, *, hadamard: bool) -> Estimate[float]:
-        return sheared_log_det(self._rows.joint(), self.split[0], self.graph.num_poses, self.anchor, step, hadamard=hadamard)
+        return sheared_log_det(self._rows.joint(), self.split[0], self.graph.num_nodes, self.anchor, step, hadamard=hadamard)
 
     def mean_resistance(self) -> Estimate[float]:
         laplacian = self._form("trees_p", self._rows)
-        return mean_resistance(laplacian, self.graph.num_poses, sample_of(self.num_existing, self._sample_size))
+        return mean_resistance(laplacian, self.graph.num_nodes, sample_of(self.num_existing, self._sample_size))
 
     def aligned_trace(self, form: PositionsName) -> Estimate[float]:
         if form not in self._traces:
@@ -117,14 +121,14 @@ class GraphForms(Forms[float]):
         if name == "positions":
             return self._positions[1].trace
         form, alignment = _blocks(self._rows, name), self._alignment
-        [trace] = inverse_traces(form, self.graph.num_poses, [(alignment.nodes, alignment.columns(form.block_size))])
+        [trace] = inverse_traces(form, self.graph.num_nodes, [(alignment.nodes, alignment.columns(form.block_size))])
         return trace
 
     def coupled_trace(self, rotations: RotationsName) -> Estimate[float]:
         """Errors: that of K by itself; that of I_pp moves N^T Pi by up to sqrt(c) times as much, c the largest ratio seen."""
         columns, along = self._positions
         moved = moved_rotations(self._rows.joint(), self.split[0], along.values)
-        solver = InverseSolver(self.graph.edges, self.graph.num_poses, self.anchor)
+        solver = InverseSolver(self.graph.edges, self.graph.num_nodes, self.anchor)
         found = solver.solve(_blocks(self._rows, rotations), moved)
         before, added = (np.sum(z * a, axis=(0, 1)) for z, a in ((along.values, columns), (found.values, moved)))
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -143,9 +147,9 @@ class GraphForms(Forms[float]):
     def _positions(self) -> tuple[FloatArray, Solutions]:
         """Columns Pi on all poses, and what I_pp^-1 makes of them."""
         form = _blocks(self._rows, "positions")
-        columns = np.zeros((self.graph.num_poses, form.block_size, self._alignment.count * self.split[0]))
+        columns = np.zeros((self.graph.num_nodes, form.block_size, self._alignment.count * self.split[0]))
         columns[self._alignment.nodes] = self._alignment.columns(form.block_size)
-        solver = InverseSolver(self.graph.edges, self.graph.num_poses, form.strongest_node())
+        solver = InverseSolver(self.graph.edges, self.graph.num_nodes, form.strongest_node())
         return columns, solver.solve(form, columns)
 
     @cached_property
@@ -165,20 +169,21 @@ class GraphForms(Forms[float]):
         if self.num_new == 0:
             return Estimate(0.0, 0.0)
         form = self._form(name, self._new_rows)
-        return LogDetSolver(form.edges, self.graph.num_poses, np.arange(self.num_existing)).log_det(form)
+        return LogDetSolver(form.edges, self.graph.num_nodes, np.arange(self.num_existing)).log_det(form)
 
     def _with_held(self, name: FormName, held: tuple[int, ...]) -> Estimate[float]:
-        return LogDetSolver(self.graph.edges, self.graph.num_poses, np.array(held)).log_det(self._form(name, self._rows))
+        return LogDetSolver(self.graph.edges, self.graph.num_nodes, np.array(held)).log_det(self._form(name, self._rows))
 
     def _form(self, name: FormName, rows: FisherRows) -> EdgeForm:
         if name in ("trees_p", "trees_r"):
-            return laplacian_form(rows.edges, self.weights[name == "trees_r"][self.graph.num_edges - len(rows.edges) :])
+            rotations = name == "trees_r"
+            return rows.trees(self.weights[rotations][self.graph.num_edges - len(rows.edges) :], rotations=rotations)
         return getattr(rows, name)()
 
     def _solver(self, held: int) -> LogDetSolver:
         """Forms of one block size share its ordering and symbolic factor."""
         if held not in self._solvers:
-            self._solvers[held] = LogDetSolver(self.graph.edges, self.graph.num_poses, held)
+            self._solvers[held] = LogDetSolver(self.graph.edges, self.graph.num_nodes, held)
         return self._solvers[held]
 
     @cached_property

@@ -6,11 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from topobelief.arrays import FloatArray, IntArray
+from topobelief.arrays import BoolArray, FloatArray, IntArray
 from topobelief.forms.protocol import Part, TreeForms, TreeName
 from topobelief.graph.alignment import DEFAULT_SAMPLE_SIZE, centring, sample_of
-from topobelief.graph.information import isotropic_weights, scalar_weights
+from topobelief.graph.information import isotropic_weights, log_dets_of_noise, scalar_weights
 from topobelief.graph.topology import Topology
+from topobelief.graph.variable_kinds import first_edges_of
 from topobelief.linalg import EdgeForm, Estimate, LogDetSolver, laplacian_form
 from topobelief.linalg.inverse_traces import inverse_traces
 
@@ -25,6 +26,8 @@ class TopologyForms(TreeForms[float]):
     information : shape (num_edges, kappa, kappa)
     existing
         Nodes, the first ones, that existed before an action. Default: all.
+    landmarks : shape (num_nodes,)
+        Which nodes are landmarks, second ends of their edges. Default: none.
     sample_size
         How many of them traces are taken over at most.
     """
@@ -35,12 +38,14 @@ class TopologyForms(TreeForms[float]):
         information: FloatArray,
         *,
         existing: int | None = None,
+        landmarks: BoolArray | None = None,
         sample_size: int = DEFAULT_SAMPLE_SIZE,
     ) -> None:
         self._existing = topology.num_nodes if existing is None else existing
+        self._landmarks = np.zeros(topology.num_nodes, dtype=np.bool_) if landmarks is None else landmarks
         self._sample_size = sample_size
         self._topology, self._information, self._weights = topology, information, weights_of(information)
-        self._solver = LogDetSolver(topology.edges, topology.num_nodes, 0)
+        self._solver = LogDetSolver(topology.edges, topology.num_nodes, int(np.argmin(self._landmarks)))
 
     @property
     def tangent_dim(self) -> int:
@@ -49,6 +54,10 @@ class TopologyForms(TreeForms[float]):
     @property
     def num_existing(self) -> int:
         return self._existing
+
+    @property
+    def landmarks(self) -> BoolArray:
+        return self._landmarks[: self._existing]
 
     @property
     def num_new(self) -> float:
@@ -69,6 +78,9 @@ class TopologyForms(TreeForms[float]):
 
     def log_det(self, form: TreeName, *, shift: float = 0.0, part: Part = "all") -> Estimate[float]:
         rows = laplacian_form(self._topology.edges, self.weights[form == "trees_r"])
+        if form == "trees_r" and self._landmarks.any():
+            targets = self._topology.edges[:, 1]
+            rows = rows.padded(self._landmarks[targets], first_edges_of(self._landmarks, targets), 1)
         if part == "new":
             held = np.arange(self._existing)
             return LogDetSolver(self._topology.edges, self._topology.num_nodes, held).log_det(rows)
@@ -92,4 +104,4 @@ def weights_of(information: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def mean_log_noise(information: FloatArray) -> float:
     """Mean over the edges of ln |Omega|; 0 without edges."""
-    return float(np.linalg.slogdet(information)[1].mean()) if len(information) else 0.0
+    return float(log_dets_of_noise(information).mean()) if len(information) else 0.0

@@ -9,13 +9,14 @@ from typing import Literal
 
 import numpy as np
 
-from topobelief.arrays import FloatArray, IntArray
+from topobelief.arrays import BoolArray, FloatArray, IntArray
 from topobelief.forms.action_batch import ActionBatch
 from topobelief.forms.degree_sums import DegreeSums
 from topobelief.forms.of_topology import weights_of
 from topobelief.forms.protocol import FormName, PositionsName
 from topobelief.graph.alignment import DEFAULT_SAMPLE_SIZE, Alignment, centring
 from topobelief.graph.fisher import FisherRows, fisher_rows
+from topobelief.graph.information import log_dets_of_noise
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg import EdgeForm, Estimate, LogDetSolver, laplacian_form
 from topobelief.linalg.elimination_paths import FormFactor, KnownColumns, changed_nodes
@@ -76,6 +77,12 @@ class PriorFactors:
         """Whitened rows of the prior's edges."""
         return fisher_rows(self.graph)
 
+    @property
+    def marks(self) -> tuple[BoolArray, BoolArray | None] | None:
+        """Which edges lead to landmarks, and which of these carry their pads; None without landmarks."""
+        rows = self.rows if self.graph.num_landmarks else None
+        return None if rows is None or rows.observing is None else (rows.observing, rows.pads)
+
     @cached_property
     def scalar_weights(self) -> tuple[FloatArray, FloatArray]:
         """(w_p, w_r) of the prior's edges."""
@@ -85,7 +92,7 @@ class PriorFactors:
     def lever_sums(self) -> FloatArray:
         """Sum of w_p |d|^2 over the edges that leave each pose, shape (n,)."""
         weights = self.scalar_weights[0] * self.rows.squared_lengths()
-        return np.bincount(self.graph.edges[:, 0], weights=weights, minlength=self.graph.num_poses).astype(np.float64)
+        return np.bincount(self.graph.edges[:, 0], weights=weights, minlength=self.graph.num_nodes).astype(np.float64)
 
     @cached_property
     def degrees(self) -> DegreeSums:
@@ -95,7 +102,7 @@ class PriorFactors:
     @cached_property
     def log_noise(self) -> float:
         """Sum over the prior's edges of ln |Omega|."""
-        return float(np.sum(np.linalg.slogdet(self.graph.information)[1]))
+        return float(np.sum(log_dets_of_noise(self.graph.information)))
 
     def factor(self, name: FormName, shift: float) -> FormFactor:
         """The factor of a form plus `shift` times I.
@@ -126,7 +133,7 @@ class PriorFactors:
     def _known_columns(self, name: FormName, form: EdgeForm, old: FormFactor | None, held: int) -> KnownColumns | None:
         if old is None or self._earlier is None or self._bases.get(held) is not old.tree:
             return None
-        changed = changed_nodes(form_of(name, self._earlier), form, self.graph.num_poses, (old.tree.held, held))
+        changed = changed_nodes(form_of(name, self._earlier), form, self.graph.num_nodes, (old.tree.held, held))
         return KnownColumns(old, changed)
 
     def solutions(self, name: SolvedName) -> Solutions:
@@ -152,7 +159,7 @@ class PriorFactors:
     def _tree(self, held: int, base: EliminationTree | None = None) -> EliminationTree:
         """The tree with this pose held, in the order of a `base` of the graph as it was unless that has grown too much."""
         if held not in self._trees:
-            edges, num_nodes = self.graph.edges, self.graph.num_poses
+            edges, num_nodes = self.graph.edges, self.graph.num_nodes
             tree = None if base is None else base.adapted(edges, num_nodes, held)
             if base is None or tree is None or tree.num_appended > _APPENDED_SHARE * tree.longest_path:
                 tree = EliminationTree.build(edges, num_nodes, held)
@@ -163,11 +170,12 @@ class PriorFactors:
 
     @cached_property
     def _diagonal_solver(self) -> LogDetSolver:
-        return LogDetSolver(self.graph.edges, self.graph.num_poses, self.anchor)
+        return LogDetSolver(self.graph.edges, self.graph.num_nodes, self.anchor)
 
 
 def form_of(name: FormName, edges: ActionBatch | PriorFactors) -> EdgeForm:
     """A form of the prior's edges or of a batch's; in blocks, whatever the noise. Trees need no rows, which take time."""
     if name in ("trees_p", "trees_r"):
-        return laplacian_form(edges.edges, edges.scalar_weights[name == "trees_r"])
+        form = laplacian_form(edges.edges, edges.scalar_weights[name == "trees_r"])
+        return form.padded(*edges.marks, 1) if name == "trees_r" and edges.marks else form
     return getattr(replace(edges.rows, weights=None), name)()

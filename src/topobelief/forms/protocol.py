@@ -26,9 +26,10 @@ from typing import Generic, Literal
 
 import numpy as np
 
-from topobelief.arrays import FloatArray
+from topobelief.arrays import BoolArray, FloatArray
 from topobelief.graph.information import SAME_NOISE, tangent_split
 from topobelief.graph.topology import Topology
+from topobelief.graph.variable_kinds import LANDMARK, POSE
 from topobelief.linalg.estimate import Estimate, Number
 
 TreeName = Literal["trees_p", "trees_r"]
@@ -58,7 +59,12 @@ class TreeForms(ABC, Generic[Number]):
     @property
     @abstractmethod
     def num_existing(self) -> int:
-        """Poses before the action."""
+        """Nodes before the action."""
+
+    @property
+    @abstractmethod
+    def landmarks(self) -> BoolArray:
+        """Which nodes before the action are landmarks, shape (num_existing,); new ones are poses."""
 
     @property
     @abstractmethod
@@ -97,13 +103,27 @@ class TreeForms(ABC, Generic[Number]):
 
     @property
     def num_free(self) -> Number:
-        """Poses after the action but for the anchor."""
+        """Nodes after the action but for the anchor."""
         return self.num_new + float(self.num_existing - 1)
 
     @property
+    def dimension(self) -> Number:
+        """Numbers of all nodes after the action but for the anchor: kappa for a pose, k for a landmark."""
+        return float(self.tangent_dim) * self.num_new + float(self.existing_dimension())
+
+    def existing_dimension(self, nodes: tuple[int, ...] | None = None) -> int:
+        """Numbers of some existing nodes, the anchor, a pose, among them but not counted. Default: all existing nodes."""
+        landmarks = self.landmarks if nodes is None else self.landmarks[list(nodes)]
+        num_landmarks = int(np.count_nonzero(landmarks))
+        num_poses = len(landmarks) - num_landmarks
+        return POSE.dimension(*self.split) * (num_poses - 1) + LANDMARK.dimension(*self.split) * num_landmarks
+
+    @property
     def weight_ratio(self) -> float | None:
-        """w_r / w_p where it is the same on all edges, else None."""
+        """w_r / w_p where it is the same on all edges, else None, as where there are landmarks."""
         w_p, w_r = self.weights
+        if self.landmarks.any():
+            return None
         if len(w_p) == 0:
             return 1.0
         ratios = w_r / w_p

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from topobelief.arrays import FloatArray, IntArray, ReadOnlyArrays, frozen_floats, frozen_ints
+from topobelief.arrays import BoolArray, FloatArray, IntArray, ReadOnlyArrays, frozen_floats, frozen_ints
 from topobelief.errors import InvalidActionError, InvalidInputError
-from topobelief.graph.information import checked_information
+from topobelief.graph.information import checked_information, measures_rotations, of_positions
 from topobelief.graph.pose_graph import PoseGraph, checked_pose_rows
 from topobelief.graph.topology import Topology
 from topobelief.wording import counted
@@ -29,9 +29,11 @@ class Action(ReadOnlyArrays):
     poses : shape (L, 3) or (L, 7), L >= 0
         Where the new poses will be, world frame.
     edges : shape (c, 2)
-        Odometry included. Indices of the graph, then num_poses, num_poses + 1, … for the new poses, in any order
-        and direction; parallel edges and edges among new poses are allowed. No edges at all ("stay") is valid with L = 0.
+        Odometry included. Indices of the graph, then num_nodes, num_nodes + 1, … for the new poses (without landmarks num_nodes
+        is num_poses), in any order and direction; parallel edges and edges among new poses are allowed. An observation of a
+        landmark leads from a pose to the landmark. No edges at all ("stay") is valid with L = 0.
     information : shape (c, kappa, kappa) or (kappa, kappa)
+        Of an observation of a landmark the block of positions counts, in the frame of the pose.
     label
         What a person calls the action.
     cost
@@ -123,6 +125,11 @@ class Action(ReadOnlyArrays):
         return len(self.edges) - self.num_new_poses
 
     @property
+    def observes(self) -> bool:
+        """Whether an edge says nothing of rotations, as observations of landmarks do."""
+        return not bool(measures_rotations(self.information).all())
+
+    @property
     def expected_closures(self) -> float:
         """`num_closures`, each as often as it is probable."""
         return self.num_closures if self.probabilities is None else float(self.probabilities.sum()) - self.num_new_poses
@@ -159,12 +166,13 @@ def check_action(graph: PoseGraph, action: Action, *, index: int | None = None) 
             action=index,
             label=label,
         )
-    total = graph.num_poses + action.num_new_poses
+    total = graph.num_nodes + action.num_new_poses
+    nodes = "nodes" if graph.num_landmarks else "poses"
     out_of_range = np.flatnonzero((action.edges >= total).any(axis=1))
     if out_of_range.size:
         edge = int(out_of_range[0])
         raise InvalidActionError(
-            f"expected indices below {total} ({graph.num_poses} poses and {action.num_new_poses} new ones), "
+            f"expected indices below {total} ({graph.num_nodes} {nodes} and {action.num_new_poses} new ones), "
             f"got {tuple(action.edges[edge].tolist())}",
             action=index,
             edge=edge,
@@ -179,15 +187,17 @@ def check_action(graph: PoseGraph, action: Action, *, index: int | None = None) 
             edge=edge,
             label=label,
         )
+    _check_observations(graph, action, index)
     if action.num_new_poses:
-        contracted = np.maximum(action.edges - graph.num_poses + 1, 0)  # the prior graph as one node, 0
+        between = action.edges[~landmark_ends(graph, action.edges)]  # an observation of a landmark leaves a pose loose
+        contracted = np.maximum(between - graph.num_nodes + 1, 0)  # the prior graph as one node, 0
         contracted = contracted[contracted[:, 0] != contracted[:, 1]]
         labels = Topology(action.num_new_poses + 1, contracted).component_labels
         loose = np.flatnonzero(labels[1:] != labels[0])
         if loose.size:
             raise InvalidActionError(
-                f"expected every new pose to be attached to the graph, got new pose {graph.num_poses + loose[0]} "
-                "without a path to it",
+                f"expected every new pose to be attached to the graph, got new pose {graph.num_nodes + loose[0]} "
+                f"without a path {'of relative poses ' if graph.num_landmarks else ''}to it",
                 action=index,
                 label=label,
             )
@@ -219,10 +229,12 @@ def _all_fit(graph: PoseGraph, actions: Sequence[Action]) -> bool:
     num_new = np.array([action.num_new_poses for action in actions])
     which = np.repeat(np.arange(len(actions)), [len(action.edges) for action in actions])
     edges = np.concatenate([action.edges for action in actions])
-    if (edges >= graph.num_poses + num_new[which, None]).any() or (edges[:, 0] == edges[:, 1]).any():
+    if (edges >= graph.num_nodes + num_new[which, None]).any() or (edges[:, 0] == edges[:, 1]).any():
         return False
+    if graph.num_landmarks or any(action.observes for action in actions):
+        return False  # told apart one by one
     first = np.cumsum(num_new) - num_new  # all new poses in a row, behind the prior as one node, 0
-    contracted = np.where(edges < graph.num_poses, 0, edges - graph.num_poses + 1 + first[which, None])
+    contracted = np.where(edges < graph.num_nodes, 0, edges - graph.num_nodes + 1 + first[which, None])
     contracted = contracted[contracted[:, 0] != contracted[:, 1]]
     labels = Topology(int(num_new.sum()) + 1, contracted).component_labels
     return bool((labels == labels[0]).all())
@@ -245,7 +257,7 @@ def driven_lengths(graph: PoseGraph, actions: Sequence[Action]) -> list[float]:
     source, target = np.concatenate([actions[index].edges for index in unknown]).T
     low, high = np.minimum(source, target), np.maximum(source, target)
     which = np.repeat(np.arange(len(unknown)), [len(actions[index].edges) for index in unknown])
-    joining = np.flatnonzero((low < graph.num_poses) & (high == graph.num_poses))
+    joining = np.flatnonzero((low < graph.num_nodes) & (high == graph.num_nodes))
     joined, earliest = np.unique(which[joining], return_index=True)
     steps[first[joined]] = places[first[joined]] - graph.positions[low[joining[earliest]]]
     for index, length in zip(
@@ -281,15 +293,44 @@ def posterior(graph: PoseGraph, action: Action) -> PoseGraph:
     poses = np.concatenate([graph.poses, action.poses]) if action.num_new_poses else graph.poses
     i, j = action.edges.T
     predicted = graph.group.between(poses[i], poses[j])
-    new_ids = _new_ids(graph.ids, action.num_new_poses)
-    return PoseGraph._from_checked(  # pyright: ignore[reportPrivateUsage]  (the two modules are one room)
-        Topology(len(poses), np.concatenate([graph.edges, action.edges])),
-        poses,
-        np.concatenate([graph.measurements, predicted]),
-        np.concatenate([graph.information, action.information]),
-        np.concatenate([graph.ids, new_ids]),
-        graph.fixed,
+    observing = landmark_ends(graph, action.edges)
+    predicted[observing, graph.group.position_dim :] = graph.group.identity()[graph.group.position_dim :]
+    return graph._with_more(  # pyright: ignore[reportPrivateUsage]  (the two modules are one room)
+        action.poses if action.num_new_poses else graph.poses[:0],
+        action.edges,
+        predicted,
+        of_positions(action.information, observing),
+        _new_ids(graph.ids, action.num_new_poses),
     )
+
+
+def landmark_ends(graph: PoseGraph, edges: IntArray) -> BoolArray:
+    """Which edges of actions, shape (c, 2), lead to landmarks of the graph, shape (c,)."""
+    target = np.minimum(edges[:, 1], graph.num_nodes - 1)
+    return graph.is_landmark[target] & (edges[:, 1] < graph.num_nodes)
+
+
+def _check_observations(graph: PoseGraph, action: Action, index: int | None) -> None:
+    """Observations lead to landmarks, and all other edges measure rotations too."""
+    observing = landmark_ends(graph, action.edges)
+    measuring = np.flatnonzero(landmark_ends(graph, action.edges[:, ::-1]))
+    if measuring.size:
+        raise InvalidActionError(
+            "expected an observation to lead from a pose to a landmark, got one from a landmark; turn it round",
+            action=index,
+            edge=int(measuring[0]),
+            label=action.label,
+        )
+    if len(action.edges) == 0:
+        return
+    partial = np.flatnonzero(~observing & ~measures_rotations(action.information))
+    if partial.size:
+        raise InvalidActionError(
+            "expected a positive definite information matrix between poses, got one that says nothing of rotations",
+            action=index,
+            edge=int(partial[0]),
+            label=action.label,
+        )
 
 
 def _new_ids(ids: IntArray, count: int) -> IntArray:

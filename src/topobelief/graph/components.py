@@ -11,7 +11,7 @@ from topobelief.graph.pose_graph import PoseGraph
 def components(graph: PoseGraph) -> list[PoseGraph]:
     """The connected components, the one with the most poses first; of equal ones the one with the first pose.
 
-    Ids, the order of poses and of edges, and fixed poses are kept.
+    Landmarks that no pose sees are in none. Ids, the order of poses and of edges, and fixed poses are kept.
 
     Examples
     --------
@@ -20,14 +20,11 @@ def components(graph: PoseGraph) -> list[PoseGraph]:
     [[8, 9], [7]]
     """
     labels = graph.topology.component_labels
-    members = [np.flatnonzero(labels == label) for label in range(graph.topology.num_components)]
-    return [part_of(graph, nodes) for nodes in sorted(members, key=lambda nodes: (-len(nodes), nodes[0]))]
+    members = [np.flatnonzero(labels == label) for label in np.unique(labels[graph.pose_indices])]
+    parts = [part_of(graph, nodes) for nodes in sorted(members, key=lambda nodes: (-len(nodes), nodes[0]))]
+    return sorted(parts, key=lambda part: -part.num_poses)
 
 
 def part_of(graph: PoseGraph, nodes: IntArray) -> PoseGraph:
     """Whole components, by the indices of their poses in increasing order."""
-    inside = np.isin(graph.edges[:, 0], nodes)
-    edges = np.searchsorted(nodes, graph.edges[inside])
-    fixed = tuple(int(np.searchsorted(nodes, index)) for index in graph.fixed if index in nodes)
-    information = graph.information[inside] if inside.any() else np.eye(graph.tangent_dim)
-    return PoseGraph(graph.poses[nodes], edges, graph.measurements[inside], information, ids=graph.ids[nodes], fixed=fixed)
+    return graph.part(nodes)

@@ -8,18 +8,20 @@ world frame and for perturbations (dp, dphi) of positions and of rotations (both
 and its information is Omega turned from the frame of the measured pose (that of j) into the world. The change of
 variables from body-frame tangents has determinant 1, so log-determinants are those of H^T Omega H in any of them.
 Omega = U^T U with U upper triangular, positions first: U = [[U_pp, U_pr], [0, U_rr]], so the rows of U_rr carry
-O_r|p = O_rr - O_rp O_pp^-1 O_pr (docs, the mathematics, section 4).
+O_r|p = O_rr - O_rp O_pp^-1 O_pr (docs, the mathematics, section 4). An observation of a landmark has the first k of these rows
+alone, turned from the frame of the pose that sees (`observations`); a landmark's missing rotation is padded (`variable_kinds`).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from topobelief.arrays import FloatArray, IntArray
+from topobelief.arrays import BoolArray, FloatArray, IntArray
 from topobelief.geometry import Group
-from topobelief.graph.information import SAME_NOISE, isotropic_weights, shared_information
+from topobelief.graph.information import SAME_NOISE, cholesky_roots, isotropic_weights, shared_information, tangent_split
+from topobelief.graph.observations import roots_of_positions
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg.edge_form import EdgeForm, laplacian_form
 from topobelief.linalg.estimate import UNIT_ROUNDOFF
@@ -38,6 +40,8 @@ class FisherRows:
     row_scale: FloatArray  # (m, 2): root of the traces of O_pp and O_rr, which bound every entry of Omega_world
     root_errors: FloatArray  # (m,): what rounding in the root adds to the error of a log-determinant, nats
     weights: tuple[FloatArray, FloatArray] | None  # (w_p, w_r) where all noise is block-isotropic
+    observing: BoolArray | None = None  # (m,): which edges lead to landmarks; None: none does
+    pads: BoolArray | None = None  # (m,): which of these carry the pad of their landmark
 
     @_may_overflow
     def joint(self) -> EdgeForm:
@@ -49,7 +53,7 @@ class FisherRows:
         magnitude_j = np.concatenate([np.repeat(scale_p, k, 1), np.repeat(scale_r, self.group.rotation_dim, 1)], axis=1)
         magnitude_i = magnitude_j.copy()
         magnitude_i[:, k:] += scale_p * np.sqrt(self.squared_lengths())[:, None]
-        return EdgeForm(self.edges, rows_i, root, magnitude_i, magnitude_j, self.root_errors, gauge_free=True)
+        return self._padded(EdgeForm(self.edges, rows_i, root, magnitude_i, magnitude_j, self.root_errors, gauge_free=True))
 
     def positions(self) -> EdgeForm:
         """I_pp: the positions with all rotations held; a scalar Laplacian w_p L where the noise allows."""
@@ -72,16 +76,28 @@ class FisherRows:
             rows_i += self.root[:, :, :k] @ self.lever
         magnitude_j = np.repeat(self.row_scale[:, 1:], q, 1)
         magnitude_i = magnitude_j + (self.row_scale[:, 0] * np.sqrt(self.squared_lengths()))[:, None]
-        return EdgeForm(self.edges, rows_i, rows_j, magnitude_i, magnitude_j, self.root_errors)
+        return self._padded(EdgeForm(self.edges, rows_i, rows_j, magnitude_i, magnitude_j, self.root_errors))
 
     def rotations_given_positions(self) -> EdgeForm:
         """L_r|p: the Laplacian with weights O_r|p; scalar, w_r L, where the noise allows."""
         k, q = self.group.position_dim, self.group.rotation_dim
         if self.weights is not None:
-            return laplacian_form(self.edges, self.weights[1], multiplicity=q)
+            return self._padded(laplacian_form(self.edges, self.weights[1], multiplicity=q))
         root = self.root[:, k:, k:]
         magnitude = np.repeat(self.row_scale[:, 1:], q, 1)
-        return EdgeForm(self.edges, -root, root, magnitude, magnitude, self.root_errors, gauge_free=True)
+        return self._padded(EdgeForm(self.edges, -root, root, magnitude, magnitude, self.root_errors, gauge_free=True))
+
+    def trees(self, weights: FloatArray, *, rotations: bool) -> EdgeForm:
+        """The Laplacian with these weights of positions or rotations."""
+        form = laplacian_form(self.edges, weights)
+        return self._padded(form) if rotations else form
+
+    def _padded(self, form: EdgeForm) -> EdgeForm:
+        """A form of rotations, or of all variables, with unit rows in place of the rotations that landmarks have not."""
+        if self.observing is None:
+            return form
+        padding = min(form.block_size, self.group.rotation_dim)
+        return form.padded(self.observing, self.pads, padding)
 
     def joined(self, more: FisherRows) -> FisherRows:
         """These edges and then the others', of the same nodes."""
@@ -99,6 +115,7 @@ class FisherRows:
             np.concatenate([self.row_scale, more.row_scale]),
             np.concatenate([self.root_errors, more.root_errors]),
             weights,
+            *(_joined_marks(self, more) if self.observing is not None or more.observing is not None else ()),
         )
 
     def weight_ratio(self) -> float | None:
@@ -114,13 +131,44 @@ class FisherRows:
         return np.sum(self.lever**2, axis=(1, 2)) / max(1, self.group.rotation_dim - 1)
 
 
-@_may_overflow
+def _joined_marks(first: FisherRows, second: FisherRows) -> list[BoolArray]:
+    """`observing` and `pads` of both."""
+    none = [np.zeros(len(rows.edges), dtype=np.bool_) for rows in (first, second)]
+    return [
+        np.concatenate([a if x is None else x for x, a in zip(pair, none, strict=True)])
+        for pair in ((first.observing, second.observing), (first.pads, second.pads))
+    ]
+
+
 def fisher_rows(graph: PoseGraph, *, first_edge: int = 0) -> FisherRows:
     """Rows of a graph's edges at its poses, from `first_edge` on."""
-    group, information, edges = graph.group, graph.information[first_edge:], graph.edges[first_edge:]
+    marks = (graph.is_landmark, graph.carries_pad[first_edge:]) if graph.num_landmarks else None
+    return rows_between(graph.group, graph.poses, graph.edges[first_edge:], graph.information[first_edge:], marks)
+
+
+@_may_overflow
+def rows_between(
+    group: Group,
+    poses: FloatArray,
+    edges: IntArray,
+    information: FloatArray,
+    marks: tuple[BoolArray, BoolArray] | None = None,
+) -> FisherRows:
+    """Rows of edges between poses, or from poses to landmarks.
+
+    Parameters
+    ----------
+    group
+    poses : shape (n, pose_size)
+    edges : shape (m, 2)
+    information : shape (m, kappa, kappa)
+    marks : (shape (n,), shape (m,)), optional
+        Which nodes are landmarks, and which edges carry the pad of theirs (`variable_kinds`). Default: none.
+    """
     k, kappa = group.position_dim, group.tangent_dim
     i, j = edges.T
-    offset = graph.positions[j] - graph.positions[i]
+    offset = group.position(poses[j]) - group.position(poses[i])
+    observing = None if marks is None else marks[0][j]
     weights = isotropic_weights(information)
     diagonal = np.diagonal(information, axis1=1, axis2=2)
     if weights is not None:
@@ -129,16 +177,33 @@ def fisher_rows(graph: PoseGraph, *, first_edge: int = 0) -> FisherRows:
         root[:, axes, axes] = np.sqrt(diagonal)
         root_errors = np.zeros(len(edges))
     else:
-        upper = np.linalg.cholesky(information).transpose(0, 2, 1)
-        rotation = graph.group.rotation_matrix(graph.poses[j])
+        upper, root_errors = _roots(information, observing)
+        rotation = group.rotation_matrix(poses[j if observing is None else np.where(observing, i, j)])
         turn = np.broadcast_to(np.eye(kappa), information.shape).copy()
         turn[:, :k, :k] = rotation.transpose(0, 2, 1)
         if group.rotation_dim == k:
             turn[:, k:, k:] = turn[:, :k, :k]
         root = upper @ turn
-        root_errors = _root_errors(information)
     traces = np.stack([diagonal[:, :k].sum(axis=1), diagonal[:, k:].sum(axis=1)], axis=1)
-    return FisherRows(group, edges, root, group.lever(offset), np.sqrt(traces), root_errors, weights)
+    rows = FisherRows(group, edges, root, group.lever(offset), np.sqrt(traces), root_errors, weights)
+    return rows if marks is None else replace(rows, observing=observing, pads=marks[1])
+
+
+def _roots(information: FloatArray, observing: BoolArray | None) -> tuple[FloatArray, FloatArray]:
+    """U with U^T U = Omega, upper triangular but for observations of fewer than k numbers, and its `root_errors`."""
+    if observing is None or not observing.any():
+        return cholesky_roots(information), _root_errors(information)
+    roots, errors = np.zeros(information.shape), np.zeros(len(information))
+    between = ~observing
+    if between.any():
+        roots[between], errors[between] = _roots(information[between], None)
+    k = tangent_split(information.shape[-1])[0]
+    blocks = information[observing, :k, :k]
+    roots[observing, :k, :k], partial = roots_of_positions(blocks)
+    errors[observing] = np.where(
+        partial, UNIT_ROUNDOFF * k, _root_error_terms(np.where(partial[:, None, None], np.eye(k), blocks))
+    )
+    return roots, errors
 
 
 def _root_errors(information: FloatArray) -> FloatArray:

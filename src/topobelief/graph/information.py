@@ -60,8 +60,17 @@ def block_isotropic(sigma_position: float, sigma_rotation: float, *, tangent_dim
     return np.diag([sigma_position**-2] * num_positions + [sigma_rotation**-2] * num_rotations)
 
 
-def checked_information(information: ArrayLike, *, num_edges: int, tangent_dim: int) -> FloatArray:
+def checked_information(
+    information: ArrayLike, *, num_edges: int, tangent_dim: int, points: BoolArray | None = None
+) -> FloatArray:
     """Information matrices of shape (num_edges, kappa, kappa), read-only, exactly symmetric; one is shared by all edges.
+
+    Parameters
+    ----------
+    information, num_edges, tangent_dim
+    points : shape (num_edges,), optional
+        Edges that say nothing of rotations. Of their matrices the block of positions counts, positive semidefinite and not
+        zero; the rest is returned as zero. Default: those whose matrix has no block of rotations.
 
     Raises
     ------
@@ -70,6 +79,10 @@ def checked_information(information: ArrayLike, *, num_edges: int, tangent_dim: 
     """
     array = frozen_floats(information, name="information")
     shape = (num_edges, tangent_dim, tangent_dim)
+    if points is None and array.shape == shape:
+        points = ~measures_rotations(array) & array.any(axis=(1, 2))
+    if points is not None and points.any():
+        return _checked_with_points(array, points, shape)
     if array.ndim == 2 and array.shape == shape[1:]:
         if num_edges:
             _require_positive_definite(array[None])
@@ -82,6 +95,56 @@ def checked_information(information: ArrayLike, *, num_edges: int, tangent_dim: 
         )
     _require_positive_definite(array)
     return _symmetric(array)
+
+
+def _checked_with_points(array: FloatArray, points: BoolArray, shape: tuple[int, int, int]) -> FloatArray:
+    """Information matrices some of which are of positions alone."""
+    if array.shape == shape[1:]:
+        array = np.broadcast_to(array, shape)
+    if array.shape != shape:
+        raise InvalidGraphError(
+            f"expected information of shape {shape} or {shape[1:]} (one matrix for all edges), got {array.shape}"
+        )
+    k, _ = tangent_split(shape[1])
+    whole = np.where(points[:, None, None], np.eye(shape[1]), array)
+    _require_positive_definite(whole)
+    blocks = np.where(points[:, None, None], array[:, :k, :k], np.eye(k))
+    scale = np.abs(blocks).max(axis=(1, 2), initial=0.0)
+    skew = np.abs(blocks - blocks.transpose(0, 2, 1)).max(axis=(1, 2), initial=0.0)
+    with np.errstate(invalid="ignore"):
+        plain = np.isfinite(scale) & (scale > 0) & (skew <= _SYMMETRY_TOLERANCE * scale)
+    plain[plain] = np.linalg.eigvalsh(blocks[plain])[:, 0] >= -_SYMMETRY_TOLERANCE * scale[plain]
+    if not plain.all():
+        raise InvalidGraphError(
+            "expected a symmetric positive semidefinite block of positions, not all zero, in the information matrix of an "
+            f"observation, got another at edge {np.flatnonzero(~plain)[0]}"
+        )
+    checked = np.array(_symmetric(whole))
+    checked[points] = 0.0
+    checked[points, :k, :k] = (blocks + blocks.transpose(0, 2, 1))[points] / 2
+    return read_only(checked)
+
+
+def cholesky_roots(information: FloatArray) -> FloatArray:
+    """U with U^T U = Omega, upper triangular, positions first; positive definite matrices, shape (m, kappa, kappa)."""
+    return np.asarray(np.linalg.cholesky(information), dtype=np.float64).transpose(0, 2, 1)
+
+
+def of_positions(information: FloatArray, points: BoolArray) -> FloatArray:
+    """The same matrices, those of the edges to points without what they say of rotations."""
+    if not points.any() or not measures_rotations(information)[points].any():
+        return information
+    k, _ = tangent_split(information.shape[-1])
+    read: FloatArray = np.asarray(np.arange(information.shape[-1]) < k, dtype=np.float64)
+    return np.where(points[:, None, None], information * np.outer(read, read), information)
+
+
+def measures_rotations(information: FloatArray) -> BoolArray:
+    """Which matrices, shape (m, kappa, kappa), say something of rotations; observations of points do not."""
+    k, _ = tangent_split(information.shape[-1])
+    if len(information) and information.strides[0] == 0:
+        return np.broadcast_to(information[0, k:, k:].any(), len(information))
+    return np.asarray(information[:, k:, k:].any(axis=(1, 2)))
 
 
 def positive_definite(information: FloatArray) -> BoolArray:
@@ -152,27 +215,61 @@ def isotropic_weights(information: FloatArray) -> tuple[FloatArray, FloatArray] 
     rotation[k:, k:] = np.eye(q)
     expected = w_p[:, None, None] * block + w_r[:, None, None] * rotation
     scale = np.sqrt(np.diagonal(information, axis1=1, axis2=2))
-    deviation = np.abs(information - expected) / (scale[:, :, None] * scale[:, None, :])
+    sizes = scale[:, :, None] * scale[:, None, :]
+    deviation = np.abs(information - expected) / np.where(sizes > 0, sizes, 1.0)
     if deviation.max(initial=0.0) > SAME_NOISE:
         return None
     return w_p, w_r
 
 
 def rotation_information_given_position(information: FloatArray) -> FloatArray:
-    """O_r|p = O_rr - O_rp O_pp^-1 O_pr, shape (num_edges, q, q)."""
+    """O_r|p = O_rr - O_rp O_pp^-1 O_pr, shape (num_edges, q, q); zero where nothing is said of rotations."""
     k, _ = tangent_split(information.shape[-1])
     o_pp, o_pr, o_rr = information[:, :k, :k], information[:, :k, k:], information[:, k:, k:]
     if not o_pr.any():
         return o_rr
-    return o_rr - o_pr.transpose(0, 2, 1) @ np.linalg.solve(o_pp, o_pr)
+    invertible = np.where(measures_rotations(information)[:, None, None], o_pp, np.eye(k))
+    return o_rr - o_pr.transpose(0, 2, 1) @ np.linalg.solve(invertible, o_pr)
 
 
 def scalar_weights(information: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """w_p = |O_pp|^(1/k) and w_r = |O_r|p|^(1/q), each of shape (num_edges,): noise as one number per part."""
+    """w_p = |O_pp|^(1/k) and w_r = |O_r|p|^(1/q), each of shape (num_edges,): noise as one number per part.
+
+    An observation of a point has w_r = 0. One of fewer than k numbers (a range, a bearing), whose |O_pp| is 0, has
+    w_p = tr(O_pp)/k, what it says along a direction on average.
+    """
     if _repeats_one(information):
         w_p, w_r = scalar_weights(information[:1])
         return np.broadcast_to(w_p, len(information)), np.broadcast_to(w_r, len(information))
     k, q = tangent_split(information.shape[-1])
+    turning = measures_rotations(information)
     log_det_p = np.linalg.slogdet(information[:, :k, :k])[1]
-    log_det_r = np.linalg.slogdet(rotation_information_given_position(information))[1]
-    return np.exp(log_det_p / k), np.exp(log_det_r / q)
+    w_p, w_r = np.exp(log_det_p / k), np.zeros(len(information))
+    if not turning.all():
+        partial = ~turning
+        partial[partial] = deficient(information[partial, :k, :k])
+        w_p[partial] = np.trace(information[partial, :k, :k], axis1=1, axis2=2) / k
+    w_r[turning] = np.exp(np.linalg.slogdet(rotation_information_given_position(information[turning]))[1] / q)
+    return w_p, w_r
+
+
+def deficient(blocks: FloatArray) -> BoolArray:
+    """Which positive semidefinite matrices are singular to rounding, shape (m,)."""
+    eigenvalues: FloatArray = np.asarray(np.linalg.eigvalsh(blocks), dtype=np.float64)
+    return eigenvalues[:, 0] <= rounding_of_eigenvalues(eigenvalues)[:, 0]
+
+
+def rounding_of_eigenvalues(eigenvalues: FloatArray) -> FloatArray:
+    """Below what eigenvalues, shape (m, k) in ascending order, are rounding; shape (m, 1)."""
+    return eigenvalues.shape[1] * 8 * np.finfo(float).eps * eigenvalues[:, -1:]
+
+
+def log_dets_of_noise(information: FloatArray) -> FloatArray:
+    """ln |Omega| of each edge, shape (m,); of an observation that of its block of positions, as `scalar_weights` has it."""
+    turning = measures_rotations(information)
+    if turning.all():
+        return np.linalg.slogdet(information)[1]
+    k, _ = tangent_split(information.shape[-1])
+    log_dets = k * np.log(scalar_weights(information)[0])
+    log_dets[turning] = np.linalg.slogdet(information[turning])[1]
+    return log_dets

@@ -42,6 +42,10 @@ def projected_to_plane(graph: PoseGraph) -> tuple[PoseGraph, str]:
     """
     if graph.group is not SE3_GROUP:
         raise InvalidGraphError(f"expected a graph in SE(3) to project onto the plane, got one in {graph.group.name}")
+    if (graph.reading_codes > 1).any():
+        raise InvalidGraphError(
+            "expected landmarks whose positions are seen to project them onto the plane, got ranges or bearings"
+        )
     poses, tilts = _planar(graph.poses)
     measurements, measured_tilts = _planar(graph.measurements)
     _require_upright(tilts, graph.ids[:, None], "poses", "pose")
@@ -52,6 +56,7 @@ def projected_to_plane(graph: PoseGraph) -> tuple[PoseGraph, str]:
         graph.edges,
         measurements,
         graph.information[:, _PLANAR[:, None], _PLANAR],
+        graph.kinds if graph.num_landmarks else None,
         ids=graph.ids,
         fixed=graph.fixed,
     )

@@ -59,6 +59,8 @@ class Dialect:
         Other tags for the same lines, each with the tag in `tags` that it stands for.
     roots
         Those of the orders in which a line holds the upper triangle R of a square root of its information, R^T R.
+    inverses
+        Those in which it holds the upper triangle of a covariance.
     """
 
     name: str
@@ -68,6 +70,7 @@ class Dialect:
     refused: Mapping[str, str] = field(default_factory=dict[str, str])
     aliases: Mapping[str, str] = field(default_factory=dict[str, str])
     roots: frozenset[str] = frozenset()
+    inverses: frozenset[str] = frozenset()
 
 
 def upper_triangle(size: int) -> Entries:

@@ -17,15 +17,18 @@ from topobelief.geometry import Group
 from topobelief.graph.dead_reckoning import dead_reckoned_poses
 from topobelief.graph.information import positive_definite
 from topobelief.graph.pose_graph import PoseGraph
+from topobelief.graph.readings import RELATIVE_POSE
+from topobelief.graph.variable_kinds import LANDMARK, POSE
 from topobelief.io.dialect import Dialect, Tag
 from topobelief.io.files import StrPath, read_text
 from topobelief.io.foreign_lines import ForeignLines
+from topobelief.io.landmark_lines import LandmarkLines
+from topobelief.io.line_fields import parsed_fields
 from topobelief.io.part import in_plane, wanted_component
 from topobelief.io.reading import ReadGraph, ReadingOptions, by_option
 from topobelief.io.robust_edges import SWITCHES, plain_edges
 from topobelief.symbols import node_name
 
-_ID_LIMIT = 2**63  # ids are kept as signed 64-bit integers
 _QUATERNION_NORMS = (1e-6, 1e6)  # what rounding and carelessness leave of a unit quaternion
 
 
@@ -73,6 +76,7 @@ class _Reader:
             fields = [self._fields(number) for number in range(1, len(self.text_lines) + 1)]
             self.rewritten, self.notes = plain_edges(path, fields, self.dialect.tags)
         self.foreign = ForeignLines()
+        self.landmarks = LandmarkLines(path)
         self.fix_lines: list[tuple[int, list[int]]] = []
         tables = self._tables()
         self.fix_lines = [(number, self.foreign.take_fixed(number, ids)) for number, ids in self.fix_lines]
@@ -92,22 +96,42 @@ class _Reader:
         named = np.unique(np.concatenate([vertex_ids.ravel(), edge_ids.ravel()]))
         if len(edge_ids) == 0 and len(named) > 1:
             raise FileError(self.path, f"expected {self.edges.tag} lines between the {len(named)} poses, got none")
-        self._refuse_edges_to_other_things(edge_ids)
+        self._refuse_edges_to_other_things(vertex_ids, edge_ids)
         if 0 < len(vertex_ids) < len(named):
             self._refuse_edges_to_nowhere(vertex_ids, edge_ids)
 
         information, definite = self._definite(edge_values[:, size:])
         ids = np.unique(np.concatenate([vertex_ids.ravel(), edge_ids[definite].ravel()]))
-        inside, kept_notes = wanted_component(self.path, ids, np.searchsorted(ids, edge_ids[definite]), self.options.component)
+        seen, landmarks = self.landmarks.observations(self.group, ids), self.landmarks.ids()
+        names = np.concatenate([ids, self.landmarks.renamed(landmarks, ids)])
+        observing = np.stack([np.searchsorted(ids, seen.poses), len(ids) + np.searchsorted(landmarks, seen.landmarks)], axis=1)
+        between = np.searchsorted(ids, edge_ids[definite])
+        inside, kept_notes = wanted_component(self.path, names, np.concatenate([between, observing]), self.options.component)
         self.notes += kept_notes
-        ids = ids[inside]
+        names, landmarks, num_poses = names[inside], landmarks[inside[len(ids) :]], len(ids)
+        kept_seen = inside[observing[:, 0]]
+        observing = (np.cumsum(inside) - 1)[observing[kept_seen]]
+        ids = ids[inside[:num_poses]]
         kept, given = definite & np.isin(edge_ids[:, 0], ids), np.isin(vertex_ids[:, 0], ids)
         edges, known = np.searchsorted(ids, edge_ids[kept]), np.searchsorted(ids, vertex_ids[given, 0])
         measurements = self.group.normalized(edge_values[kept, :size])
         poses = self._placed(ids, edges, measurements, known, self.group.normalized(vertex_values[given]))
-        fixed = self._fixed(named, ids)
+        fixed = self._fixed(np.concatenate([named, landmarks]), np.concatenate([ids, landmarks]))
+        kinds = np.repeat([POSE.name, LANDMARK.name], [len(ids), len(landmarks)])
+        readings = [*[RELATIVE_POSE] * len(edges), *np.array(seen.readings, dtype=object)[kept_seen].tolist()]
+        observed = np.tile(self.group.identity(), (len(observing), 1))
+        observed[:, : self.group.position_dim] = seen.measurements[kept_seen]
         try:
-            graph = PoseGraph(poses, edges, measurements, information[kept], ids=ids, fixed=fixed)
+            graph = PoseGraph(
+                np.concatenate([poses, self._placed_landmarks(poses, landmarks, observing, observed)]),
+                np.concatenate([edges, observing]),
+                np.concatenate([measurements, observed]),
+                np.concatenate([information[kept], seen.information[kept_seen]]),
+                kinds if len(landmarks) else None,
+                ids=names,
+                fixed=fixed,
+                readings=readings if len(landmarks) else None,
+            )
         except InvalidGraphError as error:
             raise FileError(self.path, str(error)) from None
         graph, dropped = in_plane(self.path, graph, self.options)
@@ -123,10 +147,7 @@ class _Reader:
         return dialects[0], ", ".join(tag for dialect in dialects for tag in dialect.tags)
 
     def _tables(self) -> list[_Table]:
-        """Fields by tag; blank lines, comments, sensor parameters, and what is foreign dropped.
-
-        Parameters of sensors matter to none of the lines that are read.
-        """
+        """Fields by tag; blank lines, comments, parameters of sensors that nothing refers to, and what is foreign dropped."""
         tables = {tag: _Table(tag, meaning) for tag, meaning in self.dialect.tags.items()}
         for number, line in enumerate(self.text_lines, start=1):
             fields = self._fields(number)
@@ -136,24 +157,15 @@ class _Reader:
             table = tables.get(self.dialect.aliases.get(tag, tag))
             if table is None and tag != "FIX":
                 skipped = tag.startswith("PARAMS_") or (self.rewritten and tag in SWITCHES)
+                if "landmarks" not in self.options.drop and self.landmarks.take(tag, number, line, fields):
+                    continue
                 if not skipped and not self.foreign.take(tag, number, fields):
                     raise FileError(self.path, self._refusal(tag), line=number)
                 continue
             if table is not None and len(fields) != table.meaning.num_fields:
                 raise FileError(self.path, _wrong_count(table, len(fields)), line=number)
             num_ids = table.meaning.num_ids if table is not None else len(fields)
-            try:
-                numbers = [float(text) for text in fields[num_ids:]]
-                ids = _whole_numbers(fields[:num_ids])
-                plain = line.isascii() and line.count("_") == tag.count("_")  # float takes other digits, and 1_000
-            except ValueError:
-                ids, numbers, plain = [], [], False
-            if not plain and (wrong := next((text for text in fields if not _is_number(text)), None)) is not None:
-                raise FileError(self.path, f"expected a number for {tag}, got {wrong[:40]!r}", line=number)
-            if ids and (min(ids) < 0 or max(ids) >= _ID_LIMIT):
-                wrong = next(text for text, value in zip(fields, ids, strict=False) if not 0 <= value < _ID_LIMIT)
-                message = f"expected whole ids from 0 to 2^63 - 1 for {tag}, got {wrong[:40]}; renumber the poses"
-                raise FileError(self.path, message, line=number)
+            ids, numbers = parsed_fields(self.path, tag, fields, num_ids, line, number)
             if table is not None:
                 table.lines.append(number)
                 table.ids.extend(ids)
@@ -180,6 +192,12 @@ class _Reader:
     def _common_group(self, tables: list[_Table]) -> Group:
         """The one group of all lines."""
         found = sorted((table for table in tables if table.lines), key=lambda table: table.lines[0])
+        if found and self.landmarks.first and self.landmarks.group is not found[0].meaning.group:
+            number, tag = self.landmarks.first
+            message = (
+                f"expected lines in {found[0].meaning.group.name} as {found[0].tag} on line {found[0].lines[0]}, got {tag}"
+            )
+            raise FileError(self.path, message, line=number)
         if not found:
             raise FileError(self.path, f"expected lines with {self.expected}, got none")
         first = found[0]
@@ -224,9 +242,10 @@ class _Reader:
             message = f"expected an edge between two poses, got a self-loop at {node_name(int(ids[loops[0], 0]))}"
             raise FileError(self.path, message, line=self.edges.lines[int(loops[0])])
 
-    def _refuse_edges_to_other_things(self, ids: IntArray) -> None:
-        """An edge between poses cannot lead to a vertex that was dropped because it is no pose."""
-        others = np.argwhere(np.isin(ids, list(self.foreign.vertices)))
+    def _refuse_edges_to_other_things(self, vertices: IntArray, ids: IntArray) -> None:
+        """An edge between poses cannot lead to a vertex that is no pose."""
+        landmarks = set(self.landmarks.vertices) - set(vertices.ravel().tolist())  # they may be numbered apart from poses
+        others = np.argwhere(np.isin(ids, [*self.foreign.vertices, *landmarks]))
         if others.size:
             row, end = (int(index) for index in others[0])
             message = f"expected an edge between poses, got one to {node_name(int(ids[row, end]))}, which is no pose"
@@ -256,6 +275,11 @@ class _Reader:
             with np.errstate(over="ignore"):
                 return matrices.mT @ matrices
         matrices[:, columns, rows] = entries
+        if order in self.dialect.inverses:
+            invertible = positive_definite(matrices)
+            matrices[invertible] = np.linalg.inv(matrices[invertible])
+            matrices[~invertible] = 0.0
+            matrices = (matrices + matrices.mT) / 2
         return matrices
 
     def _definite(self, entries: FloatArray) -> tuple[FloatArray, BoolArray]:
@@ -264,6 +288,15 @@ class _Reader:
         order = self.options.edge2_order if self.options.edge2_order in orders else orders[0]
         information = self._information(entries, order)
         definite = positive_definite(information)
+        if order == orders[0] and not definite.all() and self.landmarks.states_covariances:
+            stated = next(iter(self.dialect.inverses), order)
+            inverted = self._information(entries, stated)
+            if positive_definite(inverted).all():
+                self.notes.append(
+                    f"took the six numbers of {self.edges.tag} and ODOMETRY lines for covariances, as GTSAM does where "
+                    "LANDMARK or BR lines state some"
+                )
+                return inverted, positive_definite(inverted)
         wrong = np.flatnonzero(~definite)
         if wrong.size == 0:
             return information, definite
@@ -274,7 +307,10 @@ class _Reader:
             f"got eigenvalues from {spectrum[0]:.3g} to {spectrum[-1]:.3g}"
         )
         for other in orders:
-            if other not in self.dialect.roots and positive_definite(self._information(entries, other)).all():
+            if (
+                other not in self.dialect.roots | self.dialect.inverses
+                and positive_definite(self._information(entries, other)).all()
+            ):
                 advice = f'--edge2-order {other} (in Python edge2_order="{other}")'
                 message += f"; in the other order of {self.edges.tag} all edges have one: read the file with {advice}"
                 message += "".join(f", or {root} where they are square roots" for root in self.dialect.roots)
@@ -297,8 +333,19 @@ class _Reader:
             raise DisconnectedGraphError(ids[unreached].tolist(), anchor=int(ids[known.min()]), what=f"graph in {self.path}")
         return poses
 
+    def _placed_landmarks(
+        self, poses: FloatArray, landmarks: IntArray, observing: IntArray, observed: FloatArray
+    ) -> FloatArray:
+        """Landmarks as filed, the others where the first observation of each puts them; at the origin without one."""
+        known, places = self.landmarks.given(landmarks, self.group)
+        seen, first = np.unique(observing[:, 1], return_index=True)
+        rows = seen - len(poses)
+        composed = self.group.compose(poses[observing[first, 0]], observed[first])
+        places[rows] = np.where(known[rows, None], places[rows], composed)
+        return places
+
     def _fixed(self, named: IntArray, ids: IntArray) -> tuple[int, ...]:
-        """Indices of the poses that FIX lines name, in increasing order, without those that were dropped."""
+        """Indices of the nodes that FIX lines name, in increasing order, without those that were dropped."""
         fixed: set[int] = set()
         for number, wanted in self.fix_lines:
             for value in wanted:
@@ -306,7 +353,7 @@ class _Reader:
                     message = f"expected the id of a pose for FIX, got {node_name(value)}, which no other line names"
                     raise FileError(self.path, message, line=number)
                 if value in ids:
-                    fixed.add(int(np.searchsorted(ids, value)))
+                    fixed.add(int(np.flatnonzero(ids == value)[0]))
         return tuple(sorted(fixed))
 
 
@@ -318,28 +365,3 @@ def _wrong_count(table: _Table, got: int) -> str:
     ids = "an id" if meaning.num_ids == 1 else f"{meaning.num_ids} ids"
     more = f" and {meaning.num_information} information entries" if meaning.num_information else ""
     return f"expected {ids}, {meaning.group.pose_size} numbers{more} for {table.tag}, got {got} fields"
-
-
-def _whole_numbers(texts: list[str]) -> list[int]:
-    """The whole numbers that texts are; -1 in place of other numbers."""
-    try:
-        return [int(text) for text in texts]
-    except ValueError:
-        return [_whole_number(text) for text in texts]
-
-
-def _whole_number(text: str) -> int:
-    """As `_whole_numbers`, for one that may be written as 1e3 or 5.0."""
-    try:
-        return int(text)
-    except ValueError:
-        number = float(text)
-        return int(number) if number.is_integer() else -1
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return text.isascii() and "_" not in text

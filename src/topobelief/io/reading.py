@@ -15,7 +15,7 @@ from topobelief.errors import InvalidInputError, ReadingWarning, require_choice,
 from topobelief.graph.pose_graph import PoseGraph
 
 Droppable = Literal["priors", "gps", "gravity", "planes", "landmarks", "robust", "equiv", "indefinite"]
-Edge2Order = Literal["toro", "isam", "isam_root"]
+Edge2Order = Literal["toro", "isam", "isam_root", "covariance"]
 
 _DEVIATIONS = (1e-6, 1e6)  # beyond which a unit must be wrong
 
@@ -42,14 +42,15 @@ class ReadingOptions:
     ----------
     drop
         What to leave out, one word or several: "priors" (absolute priors on poses), "gps" (positions as from GPS), "gravity"
-        (directions of gravity and orientations of an IMU), "planes" (and lines), "landmarks", "robust" (edges that may be
-        outliers, with their switches), "equiv" (pairs of poses to merge), "indefinite" (edges whose information is not
-        positive definite). Vertices go together with their edges and FIX lines.
+        (directions of gravity and orientations of an IMU), "planes" (and lines), "landmarks" (with their observations),
+        "robust" (edges that may be outliers, with their switches), "equiv" (pairs of poses to merge), "indefinite" (edges whose
+        information is not positive definite). Vertices go together with their edges and FIX lines.
     robust_as_plain
         Read switchable and max-mixture edges as plain ones: correct measurements with the information that they state.
     edge2_order
         What the information in EDGE2 lines is: I11 I12 I22 I33 I13 I23 ("toro"), I11 I12 I13 I22 I23 I33 ("isam"), or
-        R11 R12 R13 R22 R23 R33 ("isam_root") of an upper triangular R, where the information is R^T R.
+        R11 R12 R13 R22 R23 R33 ("isam_root") of an upper triangular R, where the information is R^T R, or
+        C11 C12 C13 C22 C23 C33 ("covariance") of the inverse of the information.
     component
         Of a disconnected graph: "all" parts, the "largest" one (of equal ones the one with the lowest id), or the one that
         holds the pose with this id or name.

@@ -4,7 +4,8 @@
     EDGE2 i j x y theta I11 I12 I22 I33 I13 I23
 
 Note the order of the information. Files in the style of iSAM have EDGE2, ODOMETRY or Constraint2 with I11 I12 I13 I22 I23 I33,
-and iSAM itself takes these six for a square root of the information; both are options. TORO files in 3D
+and iSAM itself takes these six for a square root of the information; GTSAM may take them for a covariance. All are options, and
+the last is the default for a file with LANDMARK or BR lines that allows no other. TORO files in 3D
 (VERTEX3, EDGE3) are refused: programs disagree whether their information is per Euler angle or per rotation vector, and a guess
 would silently change every weight.
 """
@@ -35,9 +36,11 @@ TORO = Dialect(
         "toro": {SE2_GROUP.tangent_dim: (np.array([0, 0, 1, 2, 0, 1]), np.array([0, 1, 1, 2, 2, 2]))},
         "isam": {SE2_GROUP.tangent_dim: upper_triangle(SE2_GROUP.tangent_dim)},
         "isam_root": {SE2_GROUP.tangent_dim: upper_triangle(SE2_GROUP.tangent_dim)},
+        "covariance": {SE2_GROUP.tangent_dim: upper_triangle(SE2_GROUP.tangent_dim)},
     },
     aliases={"ODOMETRY": "EDGE2", "Constraint2": "EDGE2"},
     roots=frozenset({"isam_root"}),
+    inverses=frozenset({"covariance"}),
     refused={
         "VERTEX3": _SPACE,
         "EDGE3": _SPACE,

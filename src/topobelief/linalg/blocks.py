@@ -84,8 +84,7 @@ class CutGraph:
         form
             Rows of all edges of the graph, before it was cut.
         """
-        magnitudes = np.concatenate([form.magnitude_i[self.kept], form.magnitude_j[self.kept]])
-        weights = np.sum(magnitudes**2, axis=1)
+        weights = form.between(self.kept, self.edges).end_strengths()
         order = np.argsort(np.bincount(self.edges.T.ravel(), weights=weights, minlength=len(self.block_of_node)), kind="stable")
         strongest = np.empty(len(self.ground), np.int64)
         strongest[self.block_of_node[order]] = order  # the last one of each block stays

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from topobelief.arrays import FloatArray, IntArray
+from topobelief.arrays import BoolArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +34,8 @@ class EdgeForm:
     gauge_free
         Whether a motion of all nodes together leaves the rows' values as they are. Then it does not matter for ln det which one
         node is held, and ln det is a sum over blocks (docs, the mathematics, section 4).
+    point_at_j : shape (m,), optional
+        Edges whose node j has not all of the variables, so that holding it would not stop that motion. Default: none.
     """
 
     edges: IntArray
@@ -44,6 +46,7 @@ class EdgeForm:
     root_errors: FloatArray | None = None
     multiplicity: int = 1
     gauge_free: bool = False
+    point_at_j: BoolArray | None = None
 
     @property
     def block_size(self) -> int:
@@ -66,7 +69,34 @@ class EdgeForm:
             magnitude_i=self.magnitude_i[which],
             magnitude_j=self.magnitude_j[which],
             root_errors=None if self.root_errors is None else self.root_errors[which],
+            point_at_j=None if self.point_at_j is None else self.point_at_j[which],
         )
+
+    def padded(self, point_at_j: BoolArray, carrying: BoolArray | None, padding: int) -> EdgeForm:
+        """With unit rows for the last variables of nodes that have none there; these couple to nothing.
+
+        Parameters
+        ----------
+        point_at_j : shape (m,)
+            Edges whose node j lacks the last variables; their last rows are zero.
+        carrying : shape (m,), optional
+            Of these, one edge for each such node: its last rows become those unit rows. None: no edge does.
+        padding
+            How many variables are missing.
+        """
+        if carrying is None or not carrying.any():
+            return replace(self, point_at_j=point_at_j)
+        rows_j, magnitude_j = self.rows_j.copy(), self.magnitude_j.copy()
+        rows_j[carrying, -padding:, -padding:] = np.eye(padding)
+        magnitude_j[carrying, -padding:] = 1.0
+        return replace(self, rows_j=rows_j, magnitude_j=magnitude_j, point_at_j=point_at_j)
+
+    def end_strengths(self) -> FloatArray:
+        """Sum of squared rows at each end of each edge, all i, then all j, shape (2 m,); -inf where it cannot be held."""
+        strengths = np.sum(np.concatenate([self.magnitude_i, self.magnitude_j]) ** 2, axis=1)
+        if self.point_at_j is not None:
+            strengths[len(self.edges) :][self.point_at_j] = -np.inf
+        return strengths
 
     @property
     def root_error(self) -> float:
@@ -77,8 +107,7 @@ class EdgeForm:
         """The node with the largest sum of squared rows: holding it leaves the best conditioned matrix."""
         if len(self.edges) == 0:
             return 0
-        strength = np.sum(np.concatenate([self.magnitude_i, self.magnitude_j]) ** 2, axis=1)
-        return int(np.argmax(np.bincount(self.edges.T.ravel(), weights=strength)))
+        return int(np.argmax(np.bincount(self.edges.T.ravel(), weights=self.end_strengths())))
 
 
 def laplacian_form(edges: IntArray, weights: FloatArray, *, multiplicity: int = 1) -> EdgeForm:

@@ -42,18 +42,23 @@ class Extensions(NamedTuple):
     planted: BoolArray
 
     @staticmethod
-    def of(num_existing: int, edges: IntArray, edge_start: IntArray, node_start: IntArray) -> Extensions:
+    def of(
+        num_existing: int, edges: IntArray, edge_start: IntArray, node_start: IntArray, stems: BoolArray | None = None
+    ) -> Extensions:
         """Choose the forests: edges between consecutive new nodes first, then by place in the list.
 
         Parameters
         ----------
         num_existing, edges, edge_start, node_start
             As above. Every new node is connected to an existing one.
+        stems : shape (number of edges,), optional
+            Edges that may belong to a forest; those alone connect every new node. Default: all.
         """
         num_new = int(node_start[-1])
         stem, order = np.full(num_new, -1), np.empty(num_new, np.int64)
         planted = np.zeros(len(edges), np.bool_)
-        _plant_forests(num_existing, edges, edge_start, node_start, stem, order, planted)
+        usable = np.ones(len(edges), np.bool_) if stems is None else stems
+        _plant_forests(num_existing, edges, edge_start, node_start, usable, stem, order, planted)
         return Extensions(num_existing, edges, edge_start, node_start, stem, order, planted)
 
     @property
@@ -78,6 +83,7 @@ def _plant_forests(
     edges: IntArray,
     edge_start: IntArray,
     node_start: IntArray,
+    usable: BoolArray,
     stem: IntArray,
     order: IntArray,
     planted: BoolArray,
@@ -93,7 +99,7 @@ def _plant_forests(
         for sweep in range(2):
             for e in range(edge_start[k], edge_start[k + 1]):
                 i, j = max(int(edges[e, 0]) - offset, 0), max(int(edges[e, 1]) - offset, 0)
-                if (i > 0 and j > 0 and abs(i - j) == 1) != (sweep == 0):
+                if not usable[e] or (i > 0 and j > 0 and abs(i - j) == 1) != (sweep == 0):
                     continue
                 a, b = _root(group, i), _root(group, j)
                 if a == b:

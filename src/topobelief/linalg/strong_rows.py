@@ -61,7 +61,8 @@ class StrongRows:
         factors = np.ones(strengths.shape)
         factors[edge, row] = 1 / np.sqrt(strengths[edge, row])
         norms = np.sqrt(np.sum(form.rows_i**2 + form.rows_j**2, axis=2))
-        kept = (np.linalg.norm(factors * norms, axis=1) / np.linalg.norm(norms, axis=1))[:, None]
+        whole = np.linalg.norm(norms, axis=1)
+        kept = (np.linalg.norm(factors * norms, axis=1) / np.where(whole > 0, whole, 1.0))[:, None]
         weakened = replace(
             form,
             rows_i=factors[..., None] * form.rows_i,

@@ -16,7 +16,7 @@ class JointEntropy(Entropy):
     description = "joint entropy of all poses after the action"
 
     def of(self, log_det: Estimate[Number], forms: Forms[Number]) -> Estimate[Number]:
-        return entropy_of(log_det, forms.num_free, forms.tangent_dim)
+        return entropy_of(log_det, forms.dimension)
 
     def trees(self, forms: TreeForms[Number]) -> Estimate[Number]:
         return joint_signature(forms)

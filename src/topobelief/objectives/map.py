@@ -20,7 +20,7 @@ class MapEntropy(Entropy):
 
     def of(self, log_det: Estimate[Number], forms: Forms[Number]) -> Estimate[Number]:
         gain = log_det - forms.log_det("joint", part="new")
-        return entropy_of(gain, forms.num_free - forms.num_new, forms.tangent_dim)
+        return entropy_of(gain, forms.dimension - float(forms.tangent_dim) * forms.num_new)
 
     def trees(self, forms: TreeForms[Number]) -> Estimate[Number]:
         return map_signature(forms)

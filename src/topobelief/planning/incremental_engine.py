@@ -45,5 +45,5 @@ class IncrementalEngine(Engine):
 
     def extended(self, graph: PoseGraph, anchor: int) -> IncrementalEngine:
         """Orders of elimination are kept, and those parts of each factor below which nothing has changed."""
-        grown = graph.group is self.graph.group and graph.num_poses >= self.graph.num_poses
+        grown = graph.group is self.graph.group and graph.num_nodes >= self.graph.num_nodes
         return IncrementalEngine(graph, anchor, sample_size=self.sample_size, earlier=self._prior if grown else None)

@@ -20,7 +20,7 @@ import numpy as np
 
 from topobelief.arrays import FloatArray
 from topobelief.bounds.options import BoundOptions, Determinant
-from topobelief.bounds.paper import require_equal_noise
+from topobelief.bounds.paper import require_equal_noise, require_poses_alone
 from topobelief.errors import InvalidActionError, InvalidGraphError, InvalidInputError, require_choice
 from topobelief.graph.action import Action, check_actions
 from topobelief.graph.alignment import DEFAULT_SAMPLE_SIZE, checked_sample_size
@@ -28,6 +28,7 @@ from topobelief.graph.fit import warn_of_misfit
 from topobelief.graph.information import SAME_NOISE, shared_information
 from topobelief.graph.pose_graph import PoseGraph, require_pose_graph
 from topobelief.graph.topology import checked_anchor
+from topobelief.graph.well_posed import require_connected_poses, require_determined
 from topobelief.optional import has_kernels, missing_packages
 from topobelief.planning.batch import Batch, Criteria
 from topobelief.planning.decision import Decision
@@ -79,7 +80,7 @@ class Planner:
     anchor
         Pose that the bounds hold. Default: the last one, where the robot is.
     focus
-        Indices of existing poses, for the objective "focused".
+        Indices of existing poses and landmarks, for the objective "focused".
     normalized
         Add the noise normalisation of s_ST to "von_neumann_approx" (the paper's last remark).
     sample_size
@@ -153,10 +154,12 @@ class Planner:
 
     def _checked(self, graph: PoseGraph) -> int:
         """The pose to hold on a graph that can be planned on."""
-        anchor = graph.num_poses - 1 if self._given_anchor is None else checked_anchor(graph.num_poses, self._given_anchor)
-        graph.topology.require_connected(anchor=anchor, names=graph.ids)
-        self._refuse_dense_spectrum(graph.num_poses)
+        anchor = graph.last_pose if self._given_anchor is None else checked_anchor(graph.num_nodes, self._given_anchor)
+        require_determined(graph, anchor=anchor)
+        require_connected_poses(graph, anchor=anchor)
+        self._refuse_dense_spectrum(graph.num_nodes)
         if self._criteria.bounds == "paper":
+            require_poses_alone(graph.num_landmarks)
             require_equal_noise(graph.information)
         return anchor
 
@@ -256,7 +259,7 @@ class Planner:
         """
         _check_limits(margin, proof, max_evaluations, deadline, self._criteria.objective_itself.unit)
         check_actions(self._graph, actions)
-        self._refuse_dense_spectrum(self._graph.num_poses + max(action.num_new_poses for action in actions))
+        self._refuse_dense_spectrum(self._graph.num_nodes + max(action.num_new_poses for action in actions))
         if self._criteria.bounds == "paper":
             self._require_equal_noise(actions)
         engine = self._engine_for(len(actions))
@@ -348,8 +351,8 @@ def _checked_focus(graph: PoseGraph, objective: str, focus: Sequence[int] | None
     if focus is not None and not poses:
         raise InvalidInputError("expected at least one pose in focus, got none")
     for pose in poses:
-        if not 0 <= pose < graph.num_poses:
-            raise InvalidInputError(f"expected poses in focus from 0 to {graph.num_poses - 1}, got {pose}")
+        if not 0 <= pose < graph.num_nodes:
+            raise InvalidInputError(f"expected poses in focus from 0 to {graph.num_nodes - 1}, got {pose}")
     return poses
 
 

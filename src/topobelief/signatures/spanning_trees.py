@@ -18,6 +18,7 @@ from topobelief.forms.of_topology import TopologyForms
 from topobelief.forms.protocol import Part, TreeForms
 from topobelief.graph.information import checked_information, tangent_split
 from topobelief.graph.topology import Topology, checked_weights
+from topobelief.graph.variable_kinds import points_among
 from topobelief.linalg import LogDetSolver, laplacian_form
 from topobelief.linalg.estimate import LOG_2_PI_E, Estimate, Number
 from topobelief.signatures.options import SignatureOptions
@@ -59,7 +60,7 @@ def log_num_spanning_trees(topology: Topology, *, weights: ArrayLike | None = No
     return tau.known("number of spanning trees").value
 
 
-def spanning_tree_signature(topology: Topology, information: ArrayLike) -> float:
+def spanning_tree_signature(topology: Topology, information: ArrayLike, *, kinds: ArrayLike | None = None) -> float:
     """s_ST, nats; the larger, the better known the poses.
 
     With one Omega, kappa/2 tau + (n - 1)/2 [ln |Omega| - kappa ln(2 pi e)] (the paper's eq. 8 with its n corrected); with any
@@ -71,7 +72,11 @@ def spanning_tree_signature(topology: Topology, information: ArrayLike) -> float
     topology
         Undirected graph, n nodes. Parallel edges add.
     information : shape (kappa, kappa) for all edges, or (num_edges, kappa, kappa)
-        Symmetric positive definite, tangent order (translation, rotation).
+        Symmetric positive definite, tangent order (translation, rotation). Of an edge to a landmark, which leads to it from a
+        pose, the block of positions counts.
+    kinds : shape (n,), optional
+        "pose" or "landmark" for each node; with landmarks tau_p is taken over all nodes and tau_r over poses alone, and a
+        landmark counts k in place of kappa. Default: all are poses.
 
     Raises
     ------
@@ -83,11 +88,13 @@ def spanning_tree_signature(topology: Topology, information: ArrayLike) -> float
         If double precision cannot give it to 0.1 nats.
     """
     topology.require_connected()
+    landmarks = points_among(kinds, topology.num_nodes)
     array = np.asarray(information)
     tangent_dim = int(array.shape[-1]) if array.ndim else 0
     tangent_split(tangent_dim)
-    checked = checked_information(array, num_edges=topology.num_edges, tangent_dim=tangent_dim)
-    return joint_signature(TopologyForms(topology, checked)).known("s_ST").value
+    points = landmarks[topology.edges[:, 1]]
+    checked = checked_information(array, num_edges=topology.num_edges, tangent_dim=tangent_dim, points=points)
+    return joint_signature(TopologyForms(topology, checked, landmarks=landmarks)).known("s_ST").value
 
 
 def spanning_trees(forms: TreeForms[Number], options: SignatureOptions) -> Estimate[Number]:
@@ -97,7 +104,7 @@ def spanning_trees(forms: TreeForms[Number], options: SignatureOptions) -> Estim
 
 def joint_signature(forms: TreeForms[Number]) -> Estimate[Number]:
     """s_ST of all poses: minus the upper bound of their entropy."""
-    return (0.5 * weighted_trees(forms)).plus(-(forms.tangent_dim / 2 * LOG_2_PI_E) * forms.num_free)
+    return (0.5 * weighted_trees(forms)).plus(-(LOG_2_PI_E / 2) * forms.dimension)
 
 
 def map_signature(forms: TreeForms[Number]) -> Estimate[Number]:

@@ -124,7 +124,7 @@ def by_degrees(forms: TreeForms[Number], *, normalized: bool) -> Estimate[Number
     """s_VN by degrees; normalised, (n - 1)/2 [mean of ln |Omega| - kappa ln(2 pi e)] is added, as for s_ST."""
     value = math.log(2) / 2 * (forms.num_free + 1.0) - 0.5 * forms.degree_sum()
     if normalized:
-        value = value + forms.num_free / 2 * (forms.mean_log_noise() - forms.tangent_dim * LOG_2_PI_E)
+        value = value + forms.num_free / 2 * forms.mean_log_noise() - forms.dimension / 2 * LOG_2_PI_E
     return _rounded(value, forms)
 
 
