@@ -280,6 +280,18 @@ def test_after_many_closures_a_large_graph_is_factored_anew(monkeypatch):
     np.testing.assert_allclose(planner.decide([*actions, many], proof="none").signatures, signatures, rtol=1e-9)
 
 
+def test_what_a_factor_from_scratch_would_not_know_better_is_taken_from_increments(monkeypatch):
+    """Edges that know hardly anything in one direction make all errors of rounding larger."""
+    rng, noise = np.random.default_rng(13), Noise(SE2_GROUP, "full", 100.0, 0.3, 2.0, spread=7.0)
+    graph = random_pose_graph(rng, noise, 80, 20)
+    actions = [random_action(rng, graph, noise, max_new=8, max_closures=6) for _ in range(4)]
+    expected = Planner(graph, engine="scratch", **ERROR).entropies(actions)
+    values, errors = judge(graph, **ERROR).entropies(actions)
+    assert (errors > 1e-8 * values).any()
+    monkeypatch.delattr(Engine, "from_scratch")
+    np.testing.assert_allclose(Planner(graph, engine="incremental", **ERROR).entropies(actions), expected, rtol=1e-9)
+
+
 def test_an_action_beyond_double_precision_is_named():
     graph, actions = a_session(11, num_actions=2)
     n = graph.num_poses

@@ -18,11 +18,12 @@ from topobelief.graph.topology import Topology
 from topobelief.linalg.elimination_paths import FormFactor
 from topobelief.linalg.estimate import UNIT_ROUNDOFF, Estimate
 from topobelief.linalg.increments import Increments, Wanted, diagonal_increments, log_det_increments
+from topobelief.linalg.inverse import error_worth_a_qr
 
 _LARGEST_ERROR = 1.0  # nats; a factor with a larger error is not used
 _QR_SIZE = 1200  # up to here an evaluation from scratch may do better, by QR, than a factor
 _QR_ERROR = 1e-3  # nats; only beyond it is that worth its time
-_QR_RELATIVE_ERROR = 1e-8  # of a trace; the same
+_QR_RELATIVE_ERROR = 1e-8  # of a trace; up to here no QR is worth its time either
 _LARGEST_RELATIVE_ERROR = 0.02
 _GAIN_ERRORS = 3.0  # I + R enters once, what is seen of the solutions twice
 _OPERATIONS = 64
@@ -162,8 +163,8 @@ class IncrementalForms(Forms[FloatArray], ClosureForms[FloatArray]):
         relative = trusted.error + _GAIN_ERRORS * added.error + _OPERATIONS * UNIT_ROUNDOFF
         value = trace.value - added.gains
         error = np.where(added.gains == 0, trace.error, relative * (trace.value + added.gains))
-        limit = _QR_RELATIVE_ERROR if _is_small(factor) else _LARGEST_RELATIVE_ERROR
-        known = math.isfinite(trusted.value) & (error <= limit * value)
+        from_scratch = max(_QR_RELATIVE_ERROR, error_worth_a_qr(factor.tree.num_free * factor.block_size))
+        known = math.isfinite(trusted.value) & (error <= min(from_scratch, _LARGEST_RELATIVE_ERROR) * value)
         return 1 / self._prior.alignment.count * Estimate(np.where(known, value, np.nan), error)
 
     def _light(self, factor: FormFactor) -> BoolArray:

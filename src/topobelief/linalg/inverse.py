@@ -13,6 +13,7 @@ Where it is too large, strong rows are taken apart and added by Woodbury's formu
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,11 +27,21 @@ from topobelief.linalg.orthogonal import ScaledTriangle
 from topobelief.linalg.strong_rows import StrongRows, log_det_of_covariance
 
 _STRONG_ROWS_ERROR = 1e-4  # relative; beyond it strong rows are taken apart
-_QR_ERROR = 1e-10  # beyond it a QR of a small matrix is worth its time
+_QR_ERROR = 1e-10  # relative; beyond it a QR of a small matrix is worth its time
 _SMALL_QR_SIZE = 200
 _LARGE_QR_ERROR = 1e-4  # beyond it one that takes seconds
 _QR_SIZE = 1200
 _OPERATIONS = 32  # roundings behind one term of a sum of products
+
+
+def error_worth_a_qr(size: int) -> float:
+    """Relative error of a trace beyond which a matrix of so many rows is factored by QR; inf where none is.
+
+    A QR is more precise than a factor of the matrix, and slower, the more so the larger the matrix.
+    """
+    if size > _QR_SIZE:
+        return math.inf
+    return _QR_ERROR if size <= _SMALL_QR_SIZE else _LARGE_QR_ERROR
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -85,8 +96,7 @@ class InverseSolver:
         found = self._by_sparse_factor(form, right)
         if not found.relative_error <= _STRONG_ROWS_ERROR:
             found = min(found, self._by_strong_rows(form, right), key=_error)
-        limit = _QR_ERROR if size <= _SMALL_QR_SIZE else _LARGE_QR_ERROR
-        if size <= _QR_SIZE and not found.relative_error <= limit:
+        if not found.relative_error <= error_worth_a_qr(size):
             found = min(found, self._by_qr(form, right), key=_error)
         values = np.zeros(columns.shape)
         values[self._free] = found.values.reshape(-1, *columns.shape[1:])
