@@ -30,7 +30,12 @@ def convert(
         ),
     ],
     target: Annotated[
-        Path, typer.Argument(metavar="OUT", help=".g2o, .graph or .toro (TORO, 2D), or .tum (poses alone).", show_default=False)
+        Path,
+        typer.Argument(
+            metavar="OUT",
+            help=".g2o, .graph or .toro (TORO, 2D), or .tum (poses alone); .yaml: the map in a bag, as a ROS map.",
+            show_default=False,
+        ),
     ],
     noise: Annotated[
         tuple[float, float] | None,

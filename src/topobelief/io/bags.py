@@ -186,5 +186,8 @@ def _definitions(release: str) -> Any:
 
 
 def _refuse_damage(path: StrPath, error: Exception) -> NoReturn:
-    reason = " ".join(str(error).split())[:200] or type(error).__name__
-    raise FileError(path, f"expected a bag that can be read, got one that is damaged or unfinished: {reason}") from None
+    reason = " ".join(str(error).split())[:200].rstrip(".") or type(error).__name__
+    advice = "a recording that broke off can be mended with `ros2 bag reindex` or `rosbag reindex`"
+    raise FileError(
+        path, f"expected a bag that can be read, got a damaged one or one of another kind ({reason}); {advice}"
+    ) from None
