@@ -41,7 +41,9 @@ _CORNERS_PER_VERTEX = 8  # at most, per vertex asked for
 _ROOM_FOR_CORNERS = 1.25  # robot radii; in a passage with less room there is no place for two corners
 _MAX_DRAWS = 4  # times the random places asked for
 _FAR_DRAWS = 64  # places among which one far from the start is taken
-_RADIUS_ACCURACY = 0.005  # of the robot's radius, to which a radius that gets through is found
+_WIDTH_ACCURACY = 1e-4  # relative, to which the width of a passage is found
+_FINE_CHORDS = 64  # for a quarter circle, off it by less than that
+_LEAST_ROOM = 2e-4  # of the radius: what is left at a passage by the largest radius that is tried
 _SAME_PLACE = 1e-9  # metres
 
 
@@ -350,11 +352,12 @@ def _free_edges(world: World, vertices: FloatArray, robot_radius: float, *, of: 
 
 
 def _unreachable(world: World, ends: FloatArray, robot_radius: float) -> str:
-    """Why the goal cannot be reached, with about the largest radius that gets there."""
-    if _connected_region(world, ends, 0.0) is None:
+    """Why the goal cannot be reached, with the largest radius that gets there."""
+    widest = _widest(world, ends, robot_radius)
+    if not widest:
         cause = "walls separate them for a robot of any size; choose another goal"
     else:
-        fits = _largest_radius(world, ends, robot_radius)
+        fits = _largest_radius(world, ends, widest)
         named = f"a radius of {fits:g} m would get through" if fits else "only a much smaller one would get through"
         cause = f"it does not fit through the passages, which are too narrow; {named}"
     return (
@@ -363,33 +366,50 @@ def _unreachable(world: World, ends: FloatArray, robot_radius: float) -> str:
     )
 
 
-def _largest_radius(world: World, ends: FloatArray, below: float) -> float:
-    """About the largest radius for which a way is found, metres, in few digits; 0 where none is."""
+def _widest(world: World, ends: FloatArray, below: float) -> float:
+    """The clearance of the way that is nowhere narrower than need be, up to a radius, metres; 0 where there is no way."""
+    if not _joined(world, ends, 0.0):
+        return 0.0
     low, high = 0.0, below
-    while high - low > _RADIUS_ACCURACY * below:
+    while high - low > _WIDTH_ACCURACY * high:
         middle = (low + high) / 2
-        unit = 10.0 ** (math.floor(math.log10(middle)) - 3)
-        middle = float(f"{math.floor(middle / unit) * unit:.4g}")  # a number that reads as it is
-        low, high = (middle, high) if _passes(world, ends, middle) else (low, middle)
-    return low
+        low, high = (middle, high) if _joined(world, ends, middle) else (low, middle)
+    return high
+
+
+def _joined(world: World, ends: FloatArray, radius: float) -> bool:
+    """Whether a disc fits through between start and goal, by a region that is exact but for fine chords."""
+    region = shapes.eroded(world.free, radius, quadrant_chords=_FINE_CHORDS)
+    part = shapes.nearest_part(region, ends[0])
+    return part is not None and part.distance(shapes.point(ends[1])) <= _WIDTH_ACCURACY * radius + _SAME_PLACE
+
+
+def _largest_radius(world: World, ends: FloatArray, widest: float) -> float:
+    """The largest radius in four digits for which a way is found, metres, next to what fits; 0 where none is.
+
+    What fits with next to no room need not be found: each try leaves twice as much room as the last one.
+    """
+    room = _LEAST_ROOM
+    while room < 1:
+        radius = (1 - room) * widest
+        unit = 10.0 ** (math.floor(math.log10(radius)) - 3)
+        radius = float(f"{math.floor(radius / unit) * unit:.4g}")  # a number that reads as it is
+        if _passes(world, ends, radius):
+            return radius
+        room *= 2
+    return 0.0
 
 
 def _passes(world: World, ends: FloatArray, radius: float) -> bool:
     """Whether there is a way by way of the passages."""
-    region = _connected_region(world, ends, radius)
-    if region is None:
-        return False
-    places, links = find_passages(world, region, ends, radius)
-    return Roadmap(world, radius, region, places, links).shortest_path() is not None
-
-
-def _connected_region(world: World, ends: FloatArray, radius: float) -> Polygon | None:
-    """What can be reached from the start, slightly too large; None where the goal is not part of it."""
     try:
         region = world.component(ends[0], radius)
     except InvalidMapError:
-        return None
-    return region if region.distance(shapes.point(ends[1])) <= _SAME_PLACE else None
+        return False
+    if region.distance(shapes.point(ends[1])) > _SAME_PLACE:
+        return False
+    places, links = find_passages(world, region, ends, radius)
+    return Roadmap(world, radius, region, places, links).shortest_path() is not None
 
 
 def _place(place: Sequence[float] | FloatArray) -> str:

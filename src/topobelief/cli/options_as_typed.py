@@ -44,8 +44,8 @@ def as_typed(message: str, options: dict[str, str]) -> str:
     --------
     >>> as_typed("expected max_length of at least 3.20 m, got 1 m; raise it", {"max_length": "--max-length"})
     'expected --max-length of at least 3.20 m, got 1 m; raise it'
-    >>> as_typed('expected bounds that hold; use bounds="fischer", or pass exact=True', {"bounds": "--bounds", "exact": "--exact"})
-    'expected --bounds that hold; use --bounds fischer, or pass --exact'
+    >>> as_typed('expected bounds that hold, got none; use bounds="fischer"', {"bounds": "--bounds"})
+    'expected --bounds that hold, got none; use --bounds fischer'
     """
     for name, option in options.items():
         word = rf"(?<![\w-]){name}(?!\w)"

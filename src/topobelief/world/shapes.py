@@ -73,15 +73,17 @@ def difference(shape: Shape, without: Shape) -> Shape:
     return _shapely.difference(shape, without)
 
 
-def eroded(shape: Shape, distance: float) -> Shape:
+def eroded(shape: Shape, distance: float, *, quadrant_chords: int = _QUADRANT_CHORDS) -> Shape:
     """The places of a shape further than a distance from its boundary, with an error of up to 0.01 of the distance.
+
+    With more chords in place of a quarter circle the error falls with their square.
 
     Short pieces of the boundary are widened one by one and taken away together: on the staircases of an occupancy grid
     this is many times faster than to offset the polygon as a whole.
     """
     if not distance:
         return shape
-    widened = _shapely.buffer(_boundary_pieces(shape), distance, quad_segs=_QUADRANT_CHORDS)
+    widened = _shapely.buffer(_boundary_pieces(shape), distance, quad_segs=quadrant_chords)
     return _shapely.difference(shape, _shapely.union_all(widened))
 
 
