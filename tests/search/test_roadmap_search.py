@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import topobelief as tb
+from roadmap_walks import random_case
 from small_roadmaps import OPEN, drive, simple_walks, small_roadmap, values_of
 from topobelief.candidates.roadmap import Roadmap
 from topobelief.errors import InvalidInputError, NotOptimizedWarning
@@ -44,6 +45,28 @@ def test_no_simple_walk_to_the_goal_is_better(objective):
         values = values_of(graph, roadmap, simple_walks(roadmap, limit, end=1), objective=objective, closures=CLOSURES)
         result = search(graph, roadmap, goal=roadmap.vertices[1], max_length=limit, objective=objective)
         assert result.value <= values.min() + 1e-9 * abs(values.min())
+
+
+@pytest.mark.parametrize(("seed", "objective"), [(24, "map"), (100, "map"), (100, "joint"), (110, "per_pose")])
+def test_no_walk_that_turns_back_again_and_again_is_better(seed, objective):
+    """Where the leaders' neighbours and new starts lead nowhere, neighbours of other walks do."""
+    case = random_case(seed)
+    walks = case.walks()
+    paths = [case.roadmap.vertices[walk] for walk in walks]
+    rule = {"closures": case.rule, "world": case.world, "spacing": case.spacing, "information": case.information}
+    values = tb.Planner(case.graph, objective=objective).entropies(tb.predict_actions(case.graph, paths, turn=None, **rule))
+    values = values + case.cost_per_metre * np.array([case.length(walk) for walk in walks])
+    result = search(
+        case.graph,
+        case.roadmap,
+        goal=None if case.goal is None else case.roadmap.vertices[case.goal],
+        max_length=case.max_length,
+        return_to_start=case.return_to_start,
+        cost_per_metre=case.cost_per_metre,
+        objective=objective,
+        **rule,
+    )
+    assert result.value <= values.min() + 1e-9 * abs(values.min())
 
 
 def test_no_simple_walk_to_anywhere_is_better():

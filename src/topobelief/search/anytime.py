@@ -49,7 +49,7 @@ class AnytimeSearch:
     make_bounds
         Called once, when local search has found first values: the bound, and those of shorter walks. None: search without.
     began, deadline
-        Seconds: on the monotonic clock, and from then on; None for no deadline.
+        Seconds: on the clock, and from then on; None for no deadline.
     gap
         To stop at, in the unit of the objective.
     enough
@@ -57,6 +57,7 @@ class AnytimeSearch:
     max_evaluations
         After which to stop, whatever the time; None for no limit.
     on_progress
+    clock
     """
 
     def __init__(
@@ -71,9 +72,11 @@ class AnytimeSearch:
         enough: float = math.inf,
         max_evaluations: int | None = None,
         on_progress: Callable[[SearchProgress], None] | None,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._evaluations, self._local, self._make_bounds = evaluations, local, make_bounds
         self._began, self._gap, self._enough, self._on_progress = began, gap, enough, on_progress
+        self._clock = clock
         self._end = math.inf if deadline is None else began + deadline
         self._warm = math.inf if deadline is None else began + _WARM_UP_SHARE * deadline
         self._most = math.inf if max_evaluations is None else max_evaluations
@@ -119,7 +122,7 @@ class AnytimeSearch:
                     return "gap"
                 if self.lower_bound >= self._enough:
                     return "enough"
-                if time.monotonic() >= self._end:
+                if self._clock() >= self._end:
                     return "deadline"
                 if len(self._evaluations) >= self._most:
                     return "evaluations"
@@ -144,13 +147,13 @@ class AnytimeSearch:
             self._restarts += 1
             if self._local.restart(_BATCH):
                 return True
-        return False
+        return self._local.widen(_BATCH) > 0
 
     @property
     def _is_warm(self) -> bool:
         """Whether local search has found first values, or the bound would come too late otherwise."""
         enough = min(_WARM_UP, _WARM_UP_SHARE * self._most)
-        return len(self._evaluations) >= enough or time.monotonic() >= self._warm
+        return len(self._evaluations) >= enough or self._clock() >= self._warm
 
     def _bound_on(self) -> bool:
         """One step of the bound; whether it may still make progress."""
@@ -204,5 +207,5 @@ class AnytimeSearch:
         if best < self._best - SAME_VALUE * abs(best):
             self._best, self._at_best, self._restarts = best, len(self._evaluations), 0
         if self._on_progress is not None:
-            seconds = time.monotonic() - self._began
+            seconds = self._clock() - self._began
             self._on_progress(SearchProgress(seconds, len(self._evaluations), self._best, self.lower_bound))

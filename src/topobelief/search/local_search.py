@@ -10,7 +10,8 @@ A walk is the chain of shortest ways between its via-vertices (`walks`). Its nei
 The search keeps all walks that it has evaluated. The *leaders* are the best of them that differ from each other, and some of
 the best at shorter lengths, which have room for insertions. Neighbours of the first leader that has any left are evaluated, a
 batch at a time, most promising first: insertions whose via-vertex has gained most per metre so far. When all neighbours of all
-leaders are known, the search starts again from a leader some of whose via-vertices are replaced by random ones.
+leaders are known, the search starts again from a leader some of whose via-vertices are replaced by random ones; and when that
+has led nowhere, it goes on with the neighbours of all other walks, best first.
 """
 
 from __future__ import annotations
@@ -68,7 +69,11 @@ class LocalSearch:
         self._yield: dict[int, float] = {}  # most that inserting a via-vertex gained, per metre
         self._left: dict[Walk, Iterator[list[_Change]]] = {}
         self._exhausted: set[Walk] = set()
-        self._leaders_of: tuple[int, list[Walk]] = (0, [])  # when so many walks were evaluated
+        self._tried: set[Vias] = set()  # as neighbours
+        self._known = 0  # walks that were evaluated when the leaders were chosen
+        self._leading: list[Walk] = []  # the best that differ from each other;
+        self._least_of_rest = np.inf  # no walk of this value or more can be one of them
+        self._shorter: list[Walk] = []  # leaders at shorter lengths
 
     def seed(self, walks: Iterable[Walk]) -> None:
         """Evaluate walks that come from elsewhere; they take part from now on."""
@@ -82,16 +87,27 @@ class LocalSearch:
         int
             How many walks were evaluated; 0 when all neighbours of all leaders are known.
         """
+        return self._evaluate_neighbours(self._leaders(), size)
+
+    def widen(self, size: int) -> int:
+        """Evaluate about `size` neighbours of any walk, best first; 0 when all neighbours of all walks are known."""
+        walks, _, values = self._evaluations.arrays()
+        best_first: list[int] = np.argsort(values, kind="stable").tolist()
+        return self._evaluate_neighbours((walks[index] for index in best_first), size)
+
+    def _evaluate_neighbours(self, walks: Iterable[Walk], size: int) -> int:
+        """Of the first of the walks that has any left."""
         before = len(self._evaluations)
-        for leader in self._leaders():
-            while leader not in self._exhausted:
-                if leader not in self._left:
-                    self._left[leader] = self._batches(leader, size)
-                batch = next(self._left[leader], None)
+        for walk in walks:
+            while walk not in self._exhausted:
+                if walk not in self._left:
+                    self._left[walk] = self._batches(walk, size)
+                batch = next(self._left[walk], None)
                 if batch is None:
-                    self._exhausted.add(leader)
+                    self._exhausted.add(walk)
+                    del self._left[walk]
                     break
-                self._try(leader, batch)
+                self._try(walk, batch)
                 if len(self._evaluations) > before:
                     return len(self._evaluations) - before
         return 0
@@ -138,19 +154,24 @@ class LocalSearch:
 
     def _leaders(self) -> list[Walk]:
         """The best walks that differ from each other, then some of the best at shorter lengths."""
-        if self._leaders_of[0] == len(self._evaluations):
-            return self._leaders_of[1]
-        walks, lengths, values = self._evaluations.arrays()
-        best_first = np.argsort(values, kind="stable")[:_MOST_COMPARED].tolist()
-        leaders = self._evaluations.different(best_first, _NUM_LEADERS, _DIFFERENT * self._walks.max_length)
-        shorter = on_front(lengths, values)
-        spread = shorter[spread_on_front(lengths[shorter], _NUM_SHORTER)]
-        front: list[Walk] = [walks[index] for index in spread.tolist()]
-        self._leaders_of = len(self._evaluations), list(dict.fromkeys([*leaders, *front]))
-        return self._leaders_of[1]
+        if self._known < len(self._evaluations):
+            walks, lengths, values = self._evaluations.arrays()
+            if values[self._known :].min() < self._least_of_rest:
+                best_first = np.argsort(values, kind="stable")[:_MOST_COMPARED].tolist()
+                apart = _DIFFERENT * self._walks.max_length
+                self._leading = self._evaluations.different(best_first, _NUM_LEADERS, apart)
+                if len(self._leading) == _NUM_LEADERS:
+                    self._least_of_rest = self._evaluations.value(self._leading[-1])
+                elif len(best_first) == _MOST_COMPARED:
+                    self._least_of_rest = float(values[best_first[-1]])
+            on_it = on_front(lengths, values)
+            spread: list[int] = on_it[spread_on_front(lengths[on_it], _NUM_SHORTER)].tolist()
+            self._shorter = [walks[index] for index in spread]
+            self._known = len(walks)
+        return list(dict.fromkeys([*self._leading, *self._shorter]))
 
     def _batches(self, walk: Walk, size: int) -> Iterator[list[_Change]]:
-        """Neighbours of a walk, most promising first."""
+        """Neighbours of a walk that were not tried as another one's, most promising first."""
         vias = self._walks.vias(walk)
         changes = itertools.chain(
             self._omissions(vias),
@@ -160,7 +181,9 @@ class LocalSearch:
             self._exchanges(vias),
             self._recombinations(walk),
         )
-        while batch := list(itertools.islice(changes, size)):
+        new = (change for change in changes if change.walk is not None or change.vias not in self._tried)
+        while batch := list(itertools.islice(new, size)):
+            self._tried.update(change.vias for change in batch if change.walk is None)
             yield batch
 
     def _insertions(self, vias: Vias, places: Iterable[int] | None = None) -> list[_Change]:
@@ -233,7 +256,7 @@ class LocalSearch:
                         yield _Change((), walk=new)
 
     def _within(self, vias: Vias) -> Iterator[_Change]:
-        if self._walks.length(vias) <= self._walks.limit:
+        if vias not in self._tried and self._walks.length(vias) <= self._walks.limit:
             yield _Change(vias)
 
 

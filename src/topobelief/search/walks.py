@@ -47,7 +47,8 @@ class Walks:
 
     def distances(self, vertex: int) -> FloatArray:
         """Length of the shortest way between a vertex and each other one, shape (V,); inf where there is none."""
-        self.prepare([vertex])
+        if vertex not in self._lengths:
+            self.prepare([vertex])
         return self._lengths[vertex]
 
     def prepare(self, vertices: Iterable[int]) -> None:
@@ -86,15 +87,16 @@ class Walks:
         """The walk through some via-vertices, by shortest ways between them."""
         walk = [self.start]
         for source, target in itertools.pairwise(self.stops(vias)):
-            if source != target:
-                self.prepare([source])
-                walk += self._way(self._previous[source], source, target)
+            walk += self.way(source, target)
         return tuple(walk)
 
-    @staticmethod
-    def _way(previous: list[int], source: int, target: int) -> list[int]:
-        """Vertices after the source, up to the target."""
-        way = [target]
+    def way(self, source: int, target: int) -> list[int]:
+        """Vertices after the source on the shortest way to the target, which there must be; none where they are the same."""
+        if source == target:
+            return []
+        if source not in self._previous:
+            self.prepare([source])
+        previous, way = self._previous[source], [target]
         while (step := previous[way[-1]]) != source:
             way.append(step)
         return way[::-1]
