@@ -3,6 +3,8 @@ from .bounds.entropy_bounds import entropy_bounds as entropy_bounds
 from .candidates.closures import ClosureModel as ClosureModel
 from .candidates.diverse_paths import diverse_paths as diverse_paths
 from .candidates.learned_closures import learn_closures as learn_closures
+from .candidates.observations import ObservationModel as ObservationModel
+from .candidates.observations import learn_observations as learn_observations
 from .candidates.polyline import path_poses as path_poses
 from .candidates.predicted_factors import default_information as default_information
 from .candidates.predicted_factors import predict_actions as predict_actions

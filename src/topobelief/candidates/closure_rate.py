@@ -14,7 +14,7 @@ _FAR_TOO_MANY = 3.0  # times the graph's own rate
 
 def closure_rate(graph: PoseGraph) -> float:
     """Closures a pose of a graph, told from its odometry as `learn_closures` tells them."""
-    return History.of(graph).num_closures / graph.num_poses
+    return History.of(graph.poses_alone).num_closures / graph.num_poses
 
 
 def predicted_rate(actions: Sequence[Action]) -> float:

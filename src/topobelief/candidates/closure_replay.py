@@ -67,6 +67,7 @@ def replay_closures(graph: PoseGraph, *, hidden: float = 0.2, world: World | Non
         raise InvalidInputError(f"expected hidden above 0 and below 1, got {hidden}")
     if graph.num_poses < 2:
         raise InvalidInputError(f"expected a graph of at least 2 poses, got {graph.num_poses}")
+    graph = graph.poses_alone
     num_known = min(graph.num_poses - 1, max(1, math.ceil((1 - hidden) * graph.num_poses)))
     known = first_poses(graph, num_known)
     model = learn_closures(known, world=world)

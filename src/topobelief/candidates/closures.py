@@ -146,7 +146,8 @@ def closures_with_prior(
         Row of `poses`, index of the graph's pose; sorted. At most `model.max_per_pose` a row.
     """
     new = np.asarray(poses, dtype=np.float64).reshape(-1, graph.group.pose_size)
-    start = graph.num_poses - 1 if start is None else start
+    index, graph, start = graph.pose_indices, graph.poses_alone, graph.last_pose if start is None else start
+    start = int(np.searchsorted(index, start))
     count = np.broadcast_to(np.inf if steps is None else np.asarray(steps, dtype=np.float64), len(new))
     tree, chained = KDTree(graph.positions), odometry_links(graph)
     found = [np.zeros((0, 2), dtype=np.int64)]
@@ -158,7 +159,7 @@ def closures_with_prior(
         apart = np.where(old > start, np.inf, count[part][pairs[:, 0]] + start - old)
         pairs = pairs[apart >= model.min_index_gap]
         closing = closing_pairs(graph.group, new[part], graph.poses, pairs, model, chained=chained, world=world)
-        found.append(closing + np.array([first, 0]))
+        found.append(np.stack([closing[:, 0] + first, index[closing[:, 1]]], axis=1))
     return np.concatenate(found)
 
 
@@ -213,11 +214,11 @@ def closures_of_paths(
     Returns
     -------
     list of shape (C, 2)
-        New pose, old pose; indices of the graph, then n, n + 1, ... for the new poses of the path; sorted.
+        New pose, old pose; indices of the graph, then num_nodes, num_nodes + 1, ... for the new poses of the path; sorted.
     """
     if not paths:
         return []
-    n, sizes = graph.num_poses, [len(poses) for poses in paths]
+    n, sizes = graph.num_nodes, [len(poses) for poses in paths]
     ends = np.cumsum(sizes)
     steps = np.concatenate([np.arange(1, size + 1) for size in sizes])
     with_prior = closures_with_prior(graph, np.concatenate(paths), model, steps=steps, start=start, world=world)

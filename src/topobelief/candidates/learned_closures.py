@@ -68,6 +68,7 @@ def learn_closures(
     """
     if not 0 < probability <= 1:
         raise InvalidInputError(f"expected probability above 0 and at most 1, got {probability}")
+    graph = graph.poses_alone
     if rule is not None:
         made = History.of(graph, gap=rule.min_index_gap).num_closures
         return _with_probability(graph, rule, made, world, mean=rule.probability, weight=_KNOWN_WEIGHT)
@@ -124,7 +125,7 @@ class History:
 
     @classmethod
     def of(cls, graph: PoseGraph, *, gap: int | None = None) -> History:
-        """That of a graph, by a gap that is known or as `learn_closures` finds it."""
+        """That of a graph of poses alone, by a gap that is known or as `learn_closures` finds it."""
         late, early = graph.edges.max(axis=1, initial=0), graph.edges.min(axis=1, initial=graph.num_poses)
         apart = late - early
         distances = np.linalg.norm(graph.group.position(graph.measurements), axis=1)

@@ -13,10 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from topobelief.arrays import FloatArray
+from topobelief.arrays import FloatArray, IntArray
 from topobelief.candidates.closures import ClosureModel, closures_of_paths
 from topobelief.candidates.learned_closures import History, learn_closures
 from topobelief.candidates.new_poses import poses_along
+from topobelief.candidates.observations import ObservationModel, learn_observations, observations_from
 from topobelief.candidates.polyline import checked_path, path_length
 from topobelief.candidates.start import Start, find_start
 from topobelief.errors import InvalidInputError, PlanningError
@@ -36,6 +37,7 @@ def predict_actions(
     paths: Sequence[ArrayLike],
     *,
     closures: ClosureModel | None = None,
+    observations: ObservationModel | None = None,
     information: ArrayLike | None = None,
     spacing: float = 1.0,
     turn: float | None = KEY_POSE_TURN,
@@ -55,9 +57,11 @@ def predict_actions(
         Each of shape (waypoints, 2), metres. A path that does not begin at the start is led there straight.
     closures
         Which loops the new poses close. Default: learned from the graph (`learn_closures`), in the `world` that is given.
+    observations
+        Which landmarks the new poses observe, and how well. Default: learned from the graph (`learn_observations`).
     information : shape (kappa, kappa), optional
-        Of a measurement. Default: `default_information(graph)` for odometry and `closure_information(graph)` for closures. A
-        predicted closure carries `closures.probability` times this.
+        Of a measurement between poses. Default: `default_information(graph)` for odometry and `closure_information(graph)` for
+        closures. A predicted closure carries `closures.probability` times this.
     spacing
         Metres along the path from pose to pose; the last step, to the path's end, is shorter.
     turn
@@ -76,10 +80,11 @@ def predict_actions(
     Returns
     -------
     list of Action
-        In the order of the paths, labelled by their indices, "path 0" the first; `length` is the path's. Poses head along
-        the path, at a corner as they came. First the odometry, old -> new, then the closures, new -> old, sorted. A path that
-        ends where it begins at once adds nothing. A new pose first closes loops with poses of the graph; if that leaves some of
-        `closures.max_per_pose`, then with new poses before it.
+        In the order of the paths, labelled by their indices, "path 0" the first; `length` is the path's. Poses head along the
+        path, at a corner as they came. First the odometry, old -> new, then the closures, new -> old, sorted, then the
+        observations of landmarks, new -> landmark, sorted. A path that ends where it begins at once adds nothing. A new pose
+        first closes loops with poses of the graph; if that leaves some of `closures.max_per_pose`, then with new poses before
+        it.
 
     Raises
     ------
@@ -100,6 +105,7 @@ def predict_actions(
         of_odometry, of_closures = default_information(graph), closure_information(graph)
     else:
         of_odometry = of_closures = np.asarray(information, dtype=np.float64)
+    seeing = learn_observations(graph, world=world) if observations is None else observations
     begin = find_start(graph, start, world=world)
     ways: list[_Way] = []
     for index, path in enumerate(paths):
@@ -109,19 +115,21 @@ def predict_actions(
             _require_free(world, ways[-1], name)
     poses = [poses_along(graph, begin.pose, way.full, spacing=spacing, turn=turn) for way in ways]
     found = closures_of_paths(graph, poses, model, start=begin.pose, world=world)
+    sightings = _observations_of_paths(graph, poses, seeing, world)
     actions: list[Action] = []
-    for index, (way, new_poses, closing) in enumerate(zip(ways, poses, found, strict=True)):
+    for index, (way, new_poses, closing, seen) in enumerate(zip(ways, poses, found, sightings, strict=True)):
         num_new = len(new_poses)
-        new = graph.num_poses + np.arange(num_new)
+        new = graph.num_nodes + np.arange(num_new)
         before = np.r_[begin.pose, new][:num_new]
-        edges = np.concatenate([np.stack([before, new], axis=1), closing])
-        certain = model.probability == 1 or len(closing) == 0
-        expected = model.probability * of_closures
+        edges = np.concatenate([np.stack([before, new], axis=1), closing, seen])
+        parts = [(of_odometry, 1.0, num_new), (model.probability * of_closures, model.probability, len(closing))]
+        if seeing is not None:
+            parts.append((seeing.information(graph.tangent_dim, graph.group.position_dim), seeing.probability, len(seen)))
+        parts = [part for part in parts if part[2]]
+        certain = all(chance == 1 for _, chance, _ in parts)
         omega = of_odometry
-        if len(closing) and not np.array_equal(expected, of_odometry):
-            omega = np.concatenate(
-                [np.repeat(each[None], n, axis=0) for each, n in ((of_odometry, num_new), (expected, len(closing)))]
-            )
+        if not all(np.array_equal(matrix, of_odometry) for matrix, _, _ in parts):
+            omega = np.concatenate([np.repeat(matrix[None], n, axis=0) for matrix, _, n in parts])
         actions.append(
             Action(
                 new_poses,
@@ -129,10 +137,25 @@ def predict_actions(
                 omega,
                 label=f"path {index}",
                 length=path_length(way.driven),
-                probabilities=None if certain else np.r_[np.ones(num_new), np.full(len(closing), model.probability)],
+                probabilities=None if certain else np.concatenate([np.full(n, chance) for _, chance, n in parts]),
             )
         )
     return actions
+
+
+def _observations_of_paths(
+    graph: PoseGraph, paths: Sequence[FloatArray], model: ObservationModel | None, world: World | None
+) -> list[IntArray]:
+    """New pose, landmark, for the new poses of each path; indices as `Action` has them."""
+    if model is None or not paths:
+        return [np.zeros((0, 2), dtype=np.int64) for _ in paths]
+    ends = np.cumsum([len(poses) for poses in paths])
+    seen = observations_from(graph, np.concatenate(paths), model, world=world)
+    parts = np.split(seen, np.searchsorted(seen[:, 0], ends[:-1]))
+    return [
+        part + np.array([graph.num_nodes - (end - len(poses)), 0])
+        for part, end, poses in zip(parts, ends.tolist(), paths, strict=True)
+    ]
 
 
 def _chosen_model(
@@ -162,6 +185,7 @@ def default_information(graph: PoseGraph) -> FloatArray:
     """
     if graph.num_edges == 0:
         raise InvalidInputError("expected a graph with edges to take the noise from, got none; give `information`")
+    graph = graph.poses_alone
     shared = shared_information(graph.information)
     if shared is not None:
         return shared
@@ -184,6 +208,7 @@ def closure_information(graph: PoseGraph) -> FloatArray:
     InvalidInputError
         For a graph without edges.
     """
+    graph = graph.poses_alone
     if graph.num_edges == 0 or shared_information(graph.information) is not None:
         return default_information(graph)
     edges = History.of(graph).edges

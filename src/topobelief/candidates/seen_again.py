@@ -43,8 +43,8 @@ def closing_edges(graph: PoseGraph, start: int, action: Action) -> BoolArray:
     action
     """
     low, high = np.sort(action.edges, axis=1).T
-    first = (low == start) & (high == graph.num_poses)
-    between_new = (low >= graph.num_poses) & (high - low == 1)
+    first = (low == start) & (high == graph.num_nodes)
+    between_new = (low >= graph.num_nodes) & (high - low == 1)
     return ~(first | between_new)
 
 
@@ -52,13 +52,15 @@ def seen_again(graph: PoseGraph, start: int, action: Action) -> list[Stretch]:
     """Stretches of the graph's poses with which an action closes loops, those with most closures first; see `closing_edges`."""
     low, high = np.sort(action.edges, axis=1).T
     chance = np.ones(len(low)) if action.probabilities is None else action.probabilities
-    edges = np.flatnonzero(closing_edges(graph, start, action) & (low < graph.num_poses))
+    old = low < graph.num_nodes
+    old[old] = ~graph.is_landmark[low[old]]
+    edges = np.flatnonzero(closing_edges(graph, start, action) & old)
     if not edges.size:
         return []
     edges = edges[np.argsort(low[edges], kind="stable")]
     stretches: list[Stretch] = []
     for part in np.split(edges, np.flatnonzero(np.diff(low[edges]) > _GAP) + 1):
-        new = high[part] - graph.num_poses
+        new = high[part] - graph.num_nodes
         ends = (int(low[part[0]]), int(low[part[-1]]))
         stretches.append(Stretch(*ends, len(part), float(chance[part].sum()), int(new.min()), int(new.max())))
     return sorted(stretches, key=lambda stretch: -stretch.num_closures)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from topobelief.arrays import FloatArray, frozen_floats
 from topobelief.errors import InvalidInputError, PlanningError
 from topobelief.graph.pose_graph import PoseGraph
+from topobelief.symbols import node_name
 from topobelief.world import World
 
 _SAME_PLACE = 1e-9  # metres
@@ -57,10 +58,12 @@ def find_start(graph: PoseGraph, start: int | ArrayLike | Start | None = None, *
     if isinstance(start, Start):
         return start
     if start is None or isinstance(start, Integral):
-        index = -1 if start is None else int(start)
-        if not -graph.num_poses <= index < graph.num_poses:
-            raise InvalidInputError(f"expected start as the index of a pose, at most {graph.num_poses - 1}, got {index}")
-        return Start(index % graph.num_poses, graph.positions[index, :2])
+        index = graph.last_pose if start is None else int(start)
+        if not -graph.num_nodes <= index < graph.num_nodes:
+            raise InvalidInputError(f"expected start as the index of a pose, at most {graph.num_nodes - 1}, got {index}")
+        if graph.is_landmark[index]:
+            raise InvalidInputError(f"expected start as the index of a pose, got landmark {node_name(int(graph.ids[index]))}")
+        return Start(index % graph.num_nodes, graph.positions[index, :2])
     place = frozen_floats(start, name="start")
     if place.shape not in ((2,), (3,)) or not np.isfinite(place).all():
         raise InvalidInputError(f"expected start as the index of a pose or a finite place (x, y), got {start!r}")
@@ -68,9 +71,9 @@ def find_start(graph: PoseGraph, start: int | ArrayLike | Start | None = None, *
         raise InvalidInputError(f"expected start as the index of a pose in a graph in {graph.group.name}, got a place")
     place = place[:2]
     distances = np.linalg.norm(graph.positions - place, axis=1)
-    in_sight = np.ones(graph.num_poses, dtype=bool)
+    in_sight = ~graph.is_landmark
     if world is not None:
-        in_sight = world.visible(np.broadcast_to(place, graph.positions.shape), graph.positions)
+        in_sight = in_sight & world.visible(np.broadcast_to(place, graph.positions.shape), graph.positions)
     if not in_sight.any():
         raise PlanningError(
             f"expected a start in sight of a pose of the graph, got ({place[0]:g}, {place[1]:g}), from which no pose is; "

@@ -45,7 +45,7 @@ def choose_start(graph: PoseGraph, world: World, reporter: Reporter, given: Give
         start = find_start(graph, _index(graph, given, "--start"))
         reporter.say(f"from pose {given} at {shown(start.place)}")
         return start
-    last = graph.num_poses - 1
+    last = graph.last_pose
     start = find_start(graph, last)
     reporter.say(f"from pose {node_name(ids[last])}, the last of the file, at {shown(start.place)}")
     end = graph.odometry_end

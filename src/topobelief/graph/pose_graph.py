@@ -214,6 +214,11 @@ class PoseGraph(ReadOnlyArrays):
         """Indices of the nodes that are poses, ascending."""
         return read_only(np.flatnonzero(~self.is_landmark).astype(np.int64))
 
+    @cached_property
+    def poses_alone(self) -> PoseGraph:
+        """The poses and the edges between them, in their order; the graph itself where it has no landmarks."""
+        return self.part(self.pose_indices) if self.num_landmarks else self
+
     @property
     def last_pose(self) -> int:
         """Index of the last node that is a pose."""
@@ -333,8 +338,8 @@ class PoseGraph(ReadOnlyArrays):
     def with_positions(self) -> PoseGraph:
         """The same graph with readings of bearings and ranges taken for positions, to first order at these poses.
 
-        Entropies at these poses, chi^2 and its gradient stay as they are. A range alone says something of one direction, so that
-        the information of such a position is singular.
+        Entropies at these poses, chi^2 and its gradient stay as they are. A range alone says something of one direction, so
+        that the information of such a position is singular.
         """
         measurements, k = self.measurements.copy(), self.group.position_dim
         for kind, which in observations_by_kind(self.reading_codes):

@@ -14,8 +14,8 @@ def graph_text(graph: PoseGraph, dialect: Dialect) -> str:
     Raises
     ------
     InvalidInputError
-        If the dialect has no lines for the graph's group, an id is negative, which its reader would refuse, or bearings or ranges
-        are read, of which g2o has none.
+        If the dialect has no lines for the graph's group, an id is negative, which its reader would refuse, or bearings or
+        ranges are read, of which g2o has none.
     """
     tags = {meaning: tag for tag, meaning in dialect.tags.items()}
     if Tag("vertex", graph.group) not in tags:

@@ -93,7 +93,8 @@ class Sight:
         positions = np.concatenate([graph.positions, graph.group.position(action.poses)])[:, :2]
         closing = closing_edges(graph, start.pose, action)
         closures = np.sort(action.edges[closing], axis=1)
-        seen = np.unique(closures[closures < graph.num_poses])
+        seen = np.unique(closures[closures < graph.num_nodes])
+        seen = seen[~graph.is_landmark[seen]]
         return cls(closures, positions[action.edges[closing]], seen, seen_again(graph, start.pose, action))
 
     def thinned(self) -> FloatArray:
@@ -249,7 +250,7 @@ def draw_candidates(panel: Panel, paths: Sequence[FloatArray], decision: Decisio
 
 def draw_ends(panel: Panel, graph: PoseGraph, start: Start, goals: FloatArray) -> list[Entry]:
     """Start and goals, shape (G, 2)."""
-    at_pose = "the graph's last pose" if start.pose == graph.num_poses - 1 else f"pose {graph.label(start.pose)}"
+    at_pose = "the graph's last pose" if start.pose == graph.last_pose else f"pose {graph.label(start.pose)}"
     name = f"start, {f'near {at_pose}' if start.distance(graph) else at_pose}"
     key: list[Entry] = []
     for label, place, marker, colour, size in (

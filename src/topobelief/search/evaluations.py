@@ -69,7 +69,7 @@ class Evaluations:
 
     def _closes_with_map(self, action: Action) -> bool:
         source, target = action.edges.T
-        return bool(((source >= self._planner.graph.num_poses) & (target < self._planner.graph.num_poses)).any())
+        return bool(((source >= self._planner.graph.num_nodes) & (target < self._planner.graph.num_nodes)).any())
 
     def action(self, walk: Walk) -> Action:
         """What driving a walk adds to the graph; its cost is that of its length."""

@@ -36,6 +36,7 @@ def region_of_trajectory(graph: PoseGraph, width: float | None = None) -> shapes
             f"expected a graph in SE(2), got {graph.group.name}: a planar world would join storeys that lie above one "
             "another; give a floor plan instead"
         )
+    graph = graph.poses_alone
     if width is None:
         width = default_width(graph)
     require_positive("a width", width, unit="m")
@@ -57,6 +58,7 @@ def default_width(graph: PoseGraph) -> float:
     InvalidInputError
         Where no step has a length, so that the graph suggests no width.
     """
+    graph = graph.poses_alone
     first, second = odometry_steps(graph).T
     lengths = np.sort(np.linalg.norm(graph.positions[second] - graph.positions[first], axis=1))
     travelled = np.cumsum(lengths)
@@ -69,7 +71,7 @@ def default_width(graph: PoseGraph) -> float:
 
 
 def odometry_steps(graph: PoseGraph) -> IntArray:
-    """Edges between consecutive poses, each once, shape (steps, 2)."""
+    """Edges between consecutive poses of a graph without landmarks, each once, shape (steps, 2)."""
     low, high = np.sort(graph.edges, axis=1).T
     first = np.unique(low[high - low == 1])
     return np.stack([first, first + 1], axis=1)
