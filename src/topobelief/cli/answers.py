@@ -31,7 +31,7 @@ from topobelief.page.situation import rounded
 from topobelief.planning.decision import Decision
 from topobelief.planning.planner import Planner
 from topobelief.planning.registry import default_signature, has_bounds
-from topobelief.planning.units import cell, shown_unit
+from topobelief.planning.units import cell, shown_factor, shown_unit
 from topobelief.report.map_layers import Sight
 from topobelief.search.anytime import SearchProgress
 from topobelief.search.result import SearchResult
@@ -39,7 +39,8 @@ from topobelief.search.roadmap_search import search_roadmap
 from topobelief.wording import counted
 from topobelief.world import World
 
-_FIRST = 0.1  # seconds of search before the first answer
+_FIRST = 0.05  # seconds of search before the first answer
+_LATER = 3.0  # times as many before the next
 _POINTS = 24  # of the front
 _FORMATS = ("csv", "tum", "yaml")
 
@@ -103,35 +104,36 @@ class Answers:
             enough=None,
         )
 
+        next_answer = _FIRST
+
         def told(progress: SearchProgress) -> None:
+            nonlocal next_answer
             publish({"progress": plan_search.progress_told(progress, question.objective)})
+            if progress.so_far is not None and progress.seconds >= next_answer:
+                publish(self._found(question, progress.so_far(), limits))
+                next_answer = _LATER * progress.seconds
             if unwanted():
                 raise KeyboardInterrupt  # on which a search ends with what it has
 
-        found: SearchResult | None = None
-        for seconds in (_FIRST, self.seconds):
-            found = search_roadmap(
-                self.graph,
-                self.roadmap,
-                goal=question.goal,
-                max_detour=self.max_detour,
-                max_length=question.max_length,
-                return_to_start=question.return_to_start,
-                objective=question.objective,
-                closures=self.models[question.closures],
-                world=self.world if self.rule.line_of_sight else None,
-                deadline=seconds,
-                max_evaluations=self.max_evaluations,
-                spacing=self.rule.spacing,
-                information=self.rule.information,
-                start=self.start,
-                earlier=found,
-                seed=self.rule.seed,
-                on_progress=told,
-            )
-            publish(self._found(question, found, limits))
-            if found.stopped_by in ("proof", "interrupt"):
-                return
+        found = search_roadmap(
+            self.graph,
+            self.roadmap,
+            goal=question.goal,
+            max_detour=self.max_detour,
+            max_length=question.max_length,
+            return_to_start=question.return_to_start,
+            objective=question.objective,
+            closures=self.models[question.closures],
+            world=self.world if self.rule.line_of_sight else None,
+            deadline=self.seconds,
+            max_evaluations=self.max_evaluations,
+            spacing=self.rule.spacing,
+            information=self.rule.information,
+            start=self.start,
+            seed=self.rule.seed,
+            on_progress=told,
+        )
+        publish(self._found(question, found, limits))
 
     def _found(self, question: Question, found: SearchResult, limits: plan_search.Limits) -> Mapping[str, object]:
         """What a search has found so far."""
@@ -156,6 +158,7 @@ class Answers:
             "limit": found.max_length,
             "most_to_gain": found.value_now - found.lower_bound,
             **self._ways(searched.proposals, decision, errors, searched=True),
+            "front_bounds": [{"metres": metres, "value": value} for metres, value in found.front_bounds.tolist()],
         }
 
     def _compared(self, question: Question) -> Mapping[str, object]:
@@ -214,9 +217,14 @@ class Answers:
                     "files": {suffix: path_text(f"way.{suffix}", poses) for suffix in _FORMATS},
                 }
             )
-        known = values[np.isfinite(values)]
-        ends = [_told(float(end), decision.unit) for end in ((known.min(), known.max()) if known.size else (math.nan,) * 2)]
-        return {"ways": ways, "best": decision.best, "notes": list(notes), "ends": ends, "front_bounds": []}
+        return {
+            "ways": ways,
+            "best": decision.best,
+            "notes": list(notes),
+            "unit": shown_unit(decision.unit),
+            "scale": shown_factor(decision.unit),
+            "front_bounds": [],
+        }
 
 
 def _goals(question: Question) -> list[Goal]:

@@ -239,7 +239,7 @@ function drawFront() {
   const { front, front_bounds: bounds } = answer, curve = find("curve");
   find("front").hidden = front.length < 2;
   if (front.length < 2) return;
-  const [width, height, left, right, top, low] = [360, 150, 48, 10, 8, 24];
+  const [width, height, left, right, top, low] = [360, 150, 58, 10, 8, 24];
   const values = [...front.map((point) => point.value), ...bounds.map((point) => point.value)];
   const metres = [...front.map((point) => point.metres), answer.limit];
   const [x0, x1, y0, y1] = [Math.min(...metres), Math.max(...metres), Math.min(...values), Math.max(...values)];
@@ -247,14 +247,16 @@ function drawFront() {
   const y = (value) => height - low - ((value - y0) / Math.max(y1 - y0, 1e-12)) * (height - low - top);
   const steps = (points) => points.map((point, place) => (place ? `H${x(point.metres)}V` : `M${x(point.metres)} `) +
     y(point.value)).join("") + `H${x(answer.limit)}`;
+  const stepsBack = (points) => points.map((point, place) => (place ? `V${y(point.value)}H${x(point.metres)}` :
+    `M${x(point.metres)} ${y(point.value)}`)).join("");
+  const shown = (value) => `${(value * answer.scale).toFixed(2)} ${answer.unit}`;
   curve.setAttribute("viewBox", `0 0 ${width} ${height}`);
   curve.replaceChildren();
   made("svg:path", { class: "axis", d: `M${left} ${top}V${height - low}H${width - right}` }, curve);
-  for (const [value, text] of [[y0, answer.ends[0]], [y1, answer.ends[1]]])
-    made("svg:text", { x: left - 4, y: y(value) + 4, "text-anchor": "end" }, curve, text);
+  for (const value of [y0, y1]) made("svg:text", { x: left - 4, y: y(value) + 4, "text-anchor": "end" }, curve, shown(value));
   for (const value of [x0, x1])
     made("svg:text", { x: x(value), y: height - 8, "text-anchor": value === x0 ? "start" : "end" }, curve, `${value.toFixed(1)} m`);
-  if (bounds.length) made("svg:path", { class: "bound", d: steps(bounds) }, curve);
+  if (bounds.length) made("svg:path", { class: "bound", d: stepsBack(bounds) }, curve);
   made("svg:path", { class: "steps", d: steps(front) }, curve);
   const place = front.findIndex((point) => point.way === chosen), slider = find("slider");
   slider.max = front.length - 1;

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from topobelief.search.evaluations import SAME_VALUE, Evaluations
 from topobelief.search.front_bounds import FrontBounds
 from topobelief.search.local_search import LocalSearch
 from topobelief.search.walks import Walk
+
+if TYPE_CHECKING:
+    from topobelief.search.result import SearchResult
 
 Reason = Literal["proof", "gap", "enough", "deadline", "evaluations", "interrupt", "rest"]
 """Why a search stopped."""
@@ -37,6 +40,7 @@ class SearchProgress(NamedTuple):
     num_evaluations: int
     value: float  # of the best way so far, cost included
     lower_bound: float  # -inf while nothing is known
+    so_far: Callable[[], SearchResult] | None = None  # what would be returned if the search ended now; from `search_roadmap`
 
 
 class AnytimeSearch:

@@ -81,7 +81,7 @@ class SearchResult(ReadOnlyArrays):
         Time taken.
     stopped_by : str
         "proof", "gap", "enough", "deadline", "evaluations", "interrupt", or "rest" where neither value nor bound improved any
-        more.
+        more; "progress" of a search that goes on.
     objective : str
     cost_per_metre : float
     """

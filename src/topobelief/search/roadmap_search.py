@@ -178,6 +178,11 @@ def search_roadmap(
 
     stay = Action(np.zeros((0, graph.poses.shape[1])), np.zeros((0, 2), np.int64), of_odometry)
     value_now = float(planner.entropies([stay])[0])
+
+    def told(progress: SearchProgress) -> None:
+        if on_progress is not None:
+            on_progress(progress._replace(so_far=lambda: result("progress")))
+
     search = AnytimeSearch(
         evaluations,
         local,
@@ -187,41 +192,43 @@ def search_roadmap(
         gap=gap,
         enough=math.inf if enough is None else value_now - enough,
         max_evaluations=max_evaluations,
-        on_progress=on_progress,
+        on_progress=told,
         clock=clock,
     )
-    stopped_by = search.run([walks.walk(()), *_walks_of(earlier, walks.roadmap)])
 
     def way(walk: Walk) -> Way:
         return Way(evaluations.path(walk), evaluations.action(walk), evaluations.value(walk), evaluations.lengths[walk])
 
-    every, lengths, values = evaluations.arrays()
-    best = evaluations.best()
-    best_first: list[int] = [every.index(best), *np.argsort(values, kind="stable").tolist()]
-    others = evaluations.different(best_first, num_alternatives + 1, _DIFFERENT * walks.max_length)[1:]
-    objectives = values - cost_per_metre * lengths
-    front = on_front(lengths, objectives)
-    walks_on_front: list[Walk] = [every[index] for index in front.tolist()]
-    return SearchResult(
-        best=way(best),
-        alternatives=tuple(way(walk) for walk in others),
-        on_front=tuple(map(way, walks_on_front)),
-        front=np.column_stack([lengths[front], objectives[front]]),
-        front_bounds=below_front(search.front_bounds, lengths[front], objectives[front]),
-        lower_bound=search.lower_bound,
-        covers=search.covers,
-        value_with_map_alone=evaluations.value_with_map_alone(best),
-        proven_optimal=search.proven,
-        value_now=value_now,
-        shortest=None if goal is None else way(walks.walk(())),
-        max_length=walks.max_length,
-        sees_map=evaluations.sees_map,
-        num_evaluations=len(evaluations),
-        seconds=clock() - began,
-        stopped_by=stopped_by,
-        objective=objective,
-        cost_per_metre=cost_per_metre,
-    )
+    def result(stopped_by: str) -> SearchResult:
+        every, lengths, values = evaluations.arrays()
+        best = evaluations.best()
+        best_first: list[int] = [every.index(best), *np.argsort(values, kind="stable").tolist()]
+        others = evaluations.different(best_first, num_alternatives + 1, _DIFFERENT * walks.max_length)[1:]
+        objectives = values - cost_per_metre * lengths
+        front = on_front(lengths, objectives)
+        walks_on_front: list[Walk] = [every[index] for index in front.tolist()]
+        return SearchResult(
+            best=way(best),
+            alternatives=tuple(way(walk) for walk in others),
+            on_front=tuple(map(way, walks_on_front)),
+            front=np.column_stack([lengths[front], objectives[front]]),
+            front_bounds=below_front(search.front_bounds, lengths[front], objectives[front]),
+            lower_bound=search.lower_bound,
+            covers=search.covers,
+            value_with_map_alone=evaluations.value_with_map_alone(best),
+            proven_optimal=search.proven,
+            value_now=value_now,
+            shortest=None if goal is None else way(walks.walk(())),
+            max_length=walks.max_length,
+            sees_map=evaluations.sees_map,
+            num_evaluations=len(evaluations),
+            seconds=clock() - began,
+            stopped_by=stopped_by,
+            objective=objective,
+            cost_per_metre=cost_per_metre,
+        )
+
+    return result(search.run([walks.walk(()), *_walks_of(earlier, walks.roadmap)]))
 
 
 def _check_numbers(
