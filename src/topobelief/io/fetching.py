@@ -56,14 +56,26 @@ def _fetched(dataset: Dataset, folder: Path, on_progress: Transferred | None) ->
         pooch.retrieve(
             dataset.address, known_hash=f"sha256:{dataset.sha256}", fname=dataset.file, path=folder, downloader=transfer
         )
-    except (requests.RequestException, OSError) as error:
-        reason = " ".join(str(error).split())[:200]
+    except OSError as error:  # those of requests are
         advice = f"try again, or put the file there by hand; it is published at {dataset.home}"
-        raise FileError(target, f"expected to fetch it from {dataset.address}, got {reason}; {advice}") from None
+        raise FileError(
+            target, f"expected to fetch it from {dataset.address}, got {_reason(requests, error)}; {advice}"
+        ) from None
     except ValueError:  # pooch's word for a checksum that differs
         problem = f"expected SHA-256 {dataset.sha256} of {dataset.address}, got another, and discarded the file"
         raise FileError(target, f"{problem}; it was damaged on its way or has changed") from None
     return target
+
+
+def _reason(requests: Any, error: Any) -> str:
+    """What went wrong, in few words: the errors of requests and urllib3 repeat the address at length."""
+    if isinstance(error, requests.HTTPError):
+        return f"the answer {error.response.status_code} {error.response.reason}"
+    if isinstance(error, requests.Timeout):
+        return f"no answer for {_TIMEOUT} s"
+    if isinstance(error, requests.RequestException):
+        return "no connection, or one that broke off"
+    return str(error.strerror or type(error).__name__)
 
 
 class _Transfer:
