@@ -316,7 +316,9 @@ def test_what_closures_among_the_own_poses_of_a_way_gain_is_told():
     graph, roadmap = scene(3)
     closures = tb.ClosureModel(radius=1.5, max_per_pose=3, probability=1.0, min_index_gap=3)
     result = search(graph, roadmap, max_length=8.0, return_to_start=True, closures=closures)
-    own = (result.action.edges >= graph.num_poses).all(axis=1) & (np.arange(len(result.action.edges)) >= len(result.action.poses))
+    own = (result.action.edges >= graph.num_poses).all(axis=1) & (
+        np.arange(len(result.action.edges)) >= len(result.action.poses)
+    )
     assert own.any()
     kept = tb.Action(result.action.poses, result.action.edges[~own], result.action.information[~own])
     assert result.value_with_map_alone == pytest.approx(tb.Planner(graph, objective="map").entropies([kept])[0], rel=1e-9)
