@@ -222,7 +222,7 @@ def ways_along(layers: Layers, path: IntArray) -> IntArray:
 
 
 def arc_weights(arcs: Arcs, which: Int32Array, worth: FloatArray, charge: FloatArray, at_end: FloatArray) -> FloatArray:
-    """Weights of some arcs: what their records are worth, less a charge for each way, and what ends a walk after each number."""
+    """Weights of some arcs: the worth of their records, less a charge for each way, and what ends a walk after each number."""
     return _value_arcs(which, arcs.way, arcs.record, arcs.count, arcs.end, arcs.last, worth, charge, at_end)
 
 

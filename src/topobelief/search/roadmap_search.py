@@ -31,11 +31,11 @@ from topobelief.search.anytime import AnytimeSearch, SearchProgress
 from topobelief.search.both_bounds import BothBounds
 from topobelief.search.bound import WalkBound
 from topobelief.search.evaluations import Evaluations
-from topobelief.search.walk_bounds import walk_bounds
 from topobelief.search.front import below_front, on_front
 from topobelief.search.front_bounds import FrontBounds
 from topobelief.search.local_search import LocalSearch, spread_vias
 from topobelief.search.result import SearchResult, Way
+from topobelief.search.walk_bounds import walk_bounds
 from topobelief.search.walks import Walk, Walks
 from topobelief.world import World
 
