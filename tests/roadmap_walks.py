@@ -32,7 +32,7 @@ class Case:
     cost_per_metre: float
 
     def arguments(self) -> dict:
-        """Of `flow_bound`, but for the objective."""
+        """Of `walk_bounds`, but for the objective."""
         return {
             "start": 0,
             "goal": self.goal,

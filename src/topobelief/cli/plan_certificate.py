@@ -121,6 +121,7 @@ def document(searched: Searched, limits: Limits) -> dict[str, object]:
         "value_with_map_alone": found.value_with_map_alone,
         "proven_optimal": found.proven_optimal and searched.lower_bound >= found.lower_bound,
         "covers": found.covers,
+        "bound_by": found.bound_by or None,
         "max_length": found.max_length,
         "sees_map": found.sees_map,
         "front": found.front.tolist(),

@@ -104,6 +104,11 @@ class AnytimeSearch:
         return "" if self._bound is None else self._bound.covers
 
     @property
+    def bound_by(self) -> str:
+        """The name of the bound; empty where nothing is known."""
+        return "" if self._bound is None or math.isinf(self.lower_bound) else self._bound.by
+
+    @property
     def front_bounds(self) -> FloatArray:
         """Metres, and the least objective without cost that walks of up to so many metres can have, shape (G, 2)."""
         return np.zeros((0, 2)) if self._front is None else self._front.curve()

@@ -16,6 +16,8 @@ class WalkBound(Protocol):
         No walk of the class has a smaller value of the objective, cost included. It begins at -inf and never falls.
     covers
         Which walks the bound covers, and which bound it is.
+    by
+        The name of that bound.
     finished
         Whether more steps would not raise it.
     """
@@ -24,6 +26,8 @@ class WalkBound(Protocol):
     def lower_bound(self) -> float: ...
     @property
     def covers(self) -> str: ...
+    @property
+    def by(self) -> str: ...
     @property
     def finished(self) -> bool: ...
 

@@ -102,10 +102,10 @@ class Criterion:
         """The same with another reference; only "per_pose" has one."""
         return replace(self, reference=reference) if self.is_ratio and math.isfinite(reference) else self
 
-    def at_end(self) -> FloatArray:
+    def at_end(self, *, with_idle: bool = True) -> FloatArray:
         """What is linear in the plan, costs aside, by the number of a walk's new poses, shape (T + 1,)."""
         count = np.arange(self.num_new + 1)
-        value = count * self.per_new_pose + (self.num_new - count) * self.per_idle_pose
+        value = count * self.per_new_pose + (self.num_new - count) * self.per_idle_pose * with_idle
         return value - self.reference * (self.free_poses + count)
 
     def linear(self, plan: Plan | Mixture) -> float:

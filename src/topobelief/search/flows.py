@@ -26,9 +26,9 @@ from topobelief.search.longest_paths import arcs_above, arcs_to_ends, longest_pa
 from topobelief.search.plans import Background, Mixture
 from topobelief.search.reduced_prior import ReducedPrior
 from topobelief.search.rewards import Course, Rewards, allowed_arcs, used_records
+from topobelief.search.tolls import next_toll
 from topobelief.search.weights import best_weights
 
-_SAME_PLACE = 1e-9  # metres
 _ROUNDING = 1e-9  # relative; bounds are lowered by it
 _TIE = 1e-6  # of a layer: lengths that differ by less are equal
 _BACKGROUND = 1e-5  # share of the background in each flow: it is counted as if walks had it, which lowers bounds by as little
@@ -65,7 +65,7 @@ class _Part:
 
 
 class FlowBound:
-    """Lower bound of the objective over the walks of a roadmap; see `WalkBound` and `flow_bound`."""
+    """Lower bound of the objective over the walks of a roadmap; see `WalkBound` and `walk_bounds`."""
 
     def __init__(
         self,
@@ -214,7 +214,7 @@ class FlowBound:
                 best = total, longest.ahead, toll
             found.append(course)
             lines.append((longest.value + toll * course.plan.length, course.plan.length))
-            following = self._next_toll(lines, toll)
+            following = next_toll(lines, toll, self._max_length)
             if following is None:
                 break
             toll = following
@@ -245,7 +245,7 @@ class FlowBound:
         part.steps += 1
         part.fresh += 1
         self._reweigh(part, found)
-        return [walk for walk in map(self._walk, found) if walk is not None]
+        return [walk for course in found if (walk := rewards.walk(course.arcs, self._vertices, self._max_length)) is not None]
 
     def _tangent(self, gain: float, rate: float) -> float:
         """D at which the least value falls as fast as `rate`."""
@@ -254,24 +254,6 @@ class FlowBound:
             left = criterion.start - gain
             return left * ((2 * rate * math.sqrt(left)) ** (-2 / 3) - 1)
         return criterion.size / 2 * (1 / rate - 1)
-
-    def _next_toll(self, lines: list[tuple[float, float]], toll: float) -> float | None:
-        """The price of a metre to try next: where the best too long path and the best one within the length tie."""
-        worth, length = lines[-1]
-        slack = _SAME_PLACE + _ROUNDING * self._max_length
-        if length <= self._max_length + slack and toll == 0.0:
-            return None
-        over = [line for line in lines if line[1] > self._max_length + slack]
-        within = [line for line in lines if line[1] <= self._max_length + slack]
-        if not over:
-            return 0.0 if len(lines) == 1 else None
-        longest = max(over, key=lambda line: line[0] - toll * line[1])
-        if not within:
-            excess = longest[1] - self._max_length
-            return 2 * toll if toll else 0.1 * max(abs(worth), 1e-300) / max(self._max_length, excess)
-        shortest = max(within, key=lambda line: line[0] - toll * line[1])
-        following = (longest[0] - shortest[0]) / (longest[1] - shortest[1])
-        return following if following > 0 and abs(following - toll) > 1e-3 * toll else None
 
     def _thin(self, part: _Part, weights: FloatArray, ahead: FloatArray, threshold: float) -> None:
         """Leave out arcs on no path that is longer than a threshold."""
@@ -308,16 +290,6 @@ class FlowBound:
         """The flow of a part; the background to begin with."""
         plans = [course.plan for course in part.courses]
         return Mixture(plans, part.weights, self._background, _BACKGROUND if plans else 1.0)
-
-    def _walk(self, course: Course) -> IntArray | None:
-        """The vertices of a walk within the length, or None."""
-        if course.plan.length > self._max_length + _SAME_PLACE:
-            return None
-        ways = self._rewards.layers.arcs.way[course.arcs]
-        targets = self._rewards.ways.target[ways[ways >= 0]]
-        places = np.concatenate([[self._rewards.layers.first_vertex], targets])
-        vertices = self._vertices[places]
-        return vertices[vertices >= 0]
 
     def _split(self, part: _Part) -> list[_Part] | None:
         """Two parts of the walks, by what separates the weight of the active set best; None where its walks agree.

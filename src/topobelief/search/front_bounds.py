@@ -64,14 +64,12 @@ class FrontBounds:
 
         By increasing length, the bound falling; where it stays the same, at the greatest such length only.
         """
-        grid = self._whole.by_length()
-        values = np.full(len(grid), -np.inf) if self._whole.counts_costs else grid[:, 1].copy()
-        for _, bound in self._each:
-            own = bound.by_length()[:, 1]
-            values[: len(own)] = np.maximum(values[: len(own)], own)
-        values = np.maximum.accumulate(values[::-1])[::-1]
+        bounds = [bound for _, bound in self._each] + ([] if self._whole.counts_costs else [self._whole])
+        points = np.concatenate([np.zeros((0, 2)), *(bound.by_length() for bound in bounds)])
+        points = points[np.lexsort((points[:, 1], points[:, 0]))]
+        metres, values = points[:, 0], np.maximum.accumulate(points[::-1, 1])[::-1]  # what holds of longer walks holds too
         known = np.isfinite(values)
-        metres, values = grid[known, 0], values[known]
+        metres, values = metres[known], values[known]
         last = np.append(np.diff(values) < 0, True)[: len(values)]
         return np.column_stack([metres[last], values[last]])
 

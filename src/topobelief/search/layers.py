@@ -124,9 +124,8 @@ def build_layers(
     """
     num_vertices, num_labels = len(to_go), int(labels.max()) + 1
     first = first_pieces(ways.lengths, delta)
-    since = _since_label(ways.source, ways.target, ways.lengths, labels, first, delta, num_vertices, num_labels, first_vertex)
-    vertex, label = np.nonzero(since <= delta * pieces_per_pose * (1 + 1e-6) + 1e-6)
-    spot = np.full((num_vertices, num_labels), -1)
+    vertex, label = np.nonzero(_is_spot(ways, first_vertex, num_vertices, labels, delta, pieces_per_pose))
+    spot = np.full((num_vertices, num_labels), -1, dtype=np.int64)
     spot[vertex, label] = np.arange(len(vertex))
     num_layers = int(np.floor(max_length / delta + 1e-6)) + 1
     order = np.argsort(ways.source, kind="stable")
@@ -141,6 +140,21 @@ def build_layers(
     return Layers(
         len(vertex), num_layers, num_labels, pieces_per_pose, first_vertex, begin, whole, Arcs(*arcs), Records(*records)
     )
+
+
+def num_spots(ways: Ways, first_vertex: int, labels: Int32Array, delta: float, pieces_per_pose: int) -> int:
+    """How many pairs of a vertex and a label layers would have."""
+    num_vertices = int(max(ways.source.max(), ways.target.max(), first_vertex)) + 1
+    return int(np.count_nonzero(_is_spot(ways, first_vertex, num_vertices, labels, delta, pieces_per_pose)))
+
+
+def _is_spot(
+    ways: Ways, first_vertex: int, num_vertices: int, labels: Int32Array, delta: float, pieces_per_pose: int
+) -> BoolArray:
+    """Which label some walk's last pose may have at each vertex, shape (V, C)."""
+    first, num_labels = first_pieces(ways.lengths, delta), int(labels.max()) + 1
+    since = _since_label(ways.source, ways.target, ways.lengths, labels, first, delta, num_vertices, num_labels, first_vertex)
+    return since <= delta * pieces_per_pose * (1 + 1e-6) + 1e-6
 
 
 def _room(num_arcs: int, num_records: int) -> tuple[Int32Array, Int32Array]:

@@ -95,7 +95,9 @@ def _forward(
     first_state: int,
 ) -> tuple[FloatArray, Int32Array, FloatArray, float, int]:
     num_states = num_spots * num_layers
-    by_layer = np.full(num_layers, -np.inf)
+    by_layer = np.empty(num_layers)
+    for k in range(num_layers):
+        by_layer[k] = -np.inf
     best, before = np.empty(num_states), np.empty(num_states, np.int32)
     for s in range(num_states):
         best[s], before[s] = -np.inf, -1

@@ -62,6 +62,8 @@ class SearchResult(ReadOnlyArrays):
         No walk of the class has a smaller value, cost included; -inf where nothing is known.
     covers : str
         Which walks the lower bound covers, and which bound it is; empty where there is none.
+    bound_by : str
+        "flows" or "windows", whichever bound is the larger; empty where there is none.
     value_with_map_alone : float
         Value of the best way if loop closures among its own new poses did not count, as the lower bound has it; at least
         `value`.
@@ -93,6 +95,7 @@ class SearchResult(ReadOnlyArrays):
     front_bounds: FloatArray
     lower_bound: float
     covers: str
+    bound_by: str
     value_with_map_alone: float
     proven_optimal: bool
     value_now: float

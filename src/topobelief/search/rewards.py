@@ -24,6 +24,7 @@ from topobelief.search.information_gain import Slopes
 from topobelief.search.layers import Arcs, Layers
 from topobelief.search.plans import Background, Plan
 from topobelief.search.reduced_prior import world_to_body
+from topobelief.search.tolls import slack
 from topobelief.search.ways import Sightings, Ways
 
 _MOST_IN_BACKGROUND = 200  # seen poses that it closes loops with
@@ -112,8 +113,7 @@ class Rewards:
         """
         idle = np.einsum("tab,ab->t", slopes.odometry[:, 0, 0], self.idle)
         remaining = np.concatenate([np.cumsum(idle[::-1])[::-1], np.zeros(1)])
-        arcs, charge = self.layers.arcs, price * self.prices
-        return _value_arcs(which, arcs.way, arcs.record, arcs.count, arcs.end, arcs.last, worth, charge, remaining + at_end)
+        return arc_weights(self.layers.arcs, which, worth, price * self.prices, remaining + at_end)
 
     def course(self, path: IntArray, slopes: Slopes) -> Course:
         """The plan of a path, with the closures and odometry that the slopes prefer."""
@@ -143,11 +143,28 @@ class Rewards:
             ends = np.array(self._odometry_at(e, piece))
             odometry[t - 1] = ends[np.argmax(np.tensordot(ends, slopes.odometry[t - 1, before, cell], 2))]
             cells[t - 1] = cell
-        ways = arcs.way[path]
-        ways = ways[ways >= 0]
+        ways = ways_along(layers, path)
         length, cost = float(self.driven[ways].sum()), float(self.prices[ways].sum())
         plan = Plan(closures, odometry, float(num_poses), length, cost, cells)
         return Course(path, records, plan)
+
+    def walk(self, path: IntArray, vertices: IntArray, max_length: float) -> IntArray | None:
+        """The vertices of the roadmap along a path, or None where it is too long.
+
+        Parameters
+        ----------
+        path
+            Arcs.
+        vertices
+            Of the roadmap, by those of the ways; -1 for the pose where the robot is.
+        max_length
+            Metres.
+        """
+        ways = ways_along(self.layers, path)
+        if self.driven[ways].sum() > max_length + slack(max_length):
+            return None
+        along = vertices[np.concatenate([[self.layers.first_vertex], self.ways.target[ways]])]
+        return along[along >= 0]
 
     def background(self) -> Background:
         """The mean of what the records of each pose in each cell add, and of the odometry from each cell to each other.
@@ -196,6 +213,17 @@ def odometry_powers(group: Group, poses: FloatArray, origin: FloatArray, informa
     turned = at_begin.transpose(0, 2, 1)
     middle = shear.T @ information + information @ shear
     return np.stack([turned @ matrix @ at_begin for matrix in (information, middle, shear.T @ information @ shear)])
+
+
+def ways_along(layers: Layers, path: IntArray) -> IntArray:
+    """The ways that a path through layers drives."""
+    ways = layers.arcs.way[path].astype(np.int64)
+    return ways[ways >= 0]
+
+
+def arc_weights(arcs: Arcs, which: Int32Array, worth: FloatArray, charge: FloatArray, at_end: FloatArray) -> FloatArray:
+    """Weights of some arcs: the worth of their records, less a charge for each way, and what ends a walk after each number."""
+    return _value_arcs(which, arcs.way, arcs.record, arcs.count, arcs.end, arcs.last, worth, charge, at_end)
 
 
 def used_records(arcs: Arcs, which: Int32Array, num_records: int) -> Int32Array:

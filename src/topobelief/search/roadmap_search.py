@@ -28,13 +28,14 @@ from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.planner import Planner
 from topobelief.search.anytime import AnytimeSearch, SearchProgress
+from topobelief.search.both_bounds import BothBounds
 from topobelief.search.bound import WalkBound
 from topobelief.search.evaluations import Evaluations
-from topobelief.search.flow_bound import flow_bound
 from topobelief.search.front import below_front, on_front
 from topobelief.search.front_bounds import FrontBounds
 from topobelief.search.local_search import LocalSearch, spread_vias
 from topobelief.search.result import SearchResult, Way
+from topobelief.search.walk_bounds import walk_bounds
 from topobelief.search.walks import Walk, Walks
 from topobelief.world import World
 
@@ -157,7 +158,7 @@ def search_roadmap(
     local = LocalSearch(walks, evaluations, candidates, rng=np.random.default_rng(seed))
 
     def bounds() -> tuple[WalkBound, FrontBounds]:
-        whole = flow_bound(
+        flows, windows = walk_bounds(
             graph,
             walks.roadmap,
             start=walks.start,
@@ -174,7 +175,7 @@ def search_roadmap(
             pose=begin.pose,
         )
         shortest = 0.0 if goal is None else float(walks.distances(walks.start)[walks.end or 0])
-        return whole, FrontBounds(whole, shortest, walks.max_length)
+        return BothBounds(flows, windows), FrontBounds(flows, shortest, walks.max_length)
 
     stay = Action(np.zeros((0, graph.poses.shape[1])), np.zeros((0, 2), np.int64), of_odometry)
     value_now = float(planner.entropies([stay])[0])
@@ -215,6 +216,7 @@ def search_roadmap(
             front_bounds=below_front(search.front_bounds, lengths[front], objectives[front]),
             lower_bound=search.lower_bound,
             covers=search.covers,
+            bound_by=search.bound_by,
             value_with_map_alone=evaluations.value_with_map_alone(best),
             proven_optimal=search.proven,
             value_now=value_now,

@@ -1,4 +1,4 @@
-"""The bound by flows for a graph, a roadmap and a question: what `flows` needs, put together."""
+"""The bounds for a graph, a roadmap and a question: what `flows` and `windows` need, put together."""
 
 from __future__ import annotations
 
@@ -14,10 +14,12 @@ from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg.block_cholesky import Int32Array
 from topobelief.search.criteria import Criterion
 from topobelief.search.flows import FlowBound
-from topobelief.search.layers import build_layers
+from topobelief.search.layers import Layers, build_layers, num_spots
 from topobelief.search.reduced_prior import ReducedPrior
 from topobelief.search.rewards import Rewards, odometry_powers
 from topobelief.search.ways import Ways, cells_of_pieces, find_sightings, first_pieces
+from topobelief.search.window_bound import WindowBound
+from topobelief.search.windows import Windows, find_odometry
 from topobelief.world import World
 
 _OBJECTIVES = ("error", "map", "joint", "per_pose")
@@ -26,11 +28,13 @@ _FINEST, _COARSEST = 40, 3  # pieces per spacing
 _FINE = 10  # pieces per pose; where more are affordable, steps are cheap and splitting does without cells
 _VARIABLES = 2000  # at most so many pairs of a new pose and a cell
 _MOST_CELLS = 80
+_MOST_IN_WINDOWS = 1500  # seen poses, the covariance between all of which windows need
+_ARCS_OF_WINDOWS = 3_000_000
 _SAME_PLACE = 1e-9  # metres
 _ROUNDING = 1e-9  # relative; bounds are lowered by it
 
 
-def flow_bound(
+def walk_bounds(
     graph: PoseGraph,
     roadmap: Roadmap,
     *,
@@ -48,8 +52,10 @@ def flow_bound(
     pose: int | None = None,
     edge_costs: ArrayLike | None = None,
     pieces_per_pose: int | None = None,
-) -> FlowBound:
-    """The bound over the walks from one vertex of a roadmap.
+) -> tuple[FlowBound, WindowBound | None]:
+    """The bounds over the walks from one vertex of a roadmap: by flows, and by windows where there are such.
+
+    Windows are for entropies and at most one closure a pose.
 
     It covers every walk that `predict_actions` makes an action of with these closures, this spacing and information, and no
     turn, and counts the closures with poses of the map. Closures among the walk's own new poses are not counted.
@@ -161,7 +167,8 @@ def flow_bound(
         min_index_gap=closures.min_index_gap,
         with_errors=objective == "error",
     )
-    powers = odometry_powers(graph.group, ways.poses(graph, pose), graph.positions[pose], omega)
+    poses = ways.poses(graph, pose)
+    powers = odometry_powers(graph.group, poses, graph.positions[pose], omega)
     idle = powers[0, 0] * float(counts_idle)
     fewest = max(0, math.ceil((whole - max_length + to_go[start]) / spacing - 1e-6))
     criterion = Criterion.of(objective, prior, idle, num_new, fewest)
@@ -170,11 +177,29 @@ def flow_bound(
     covers = (
         f"every walk of the roadmap of at most {max_length:.6g} m"
         + (" to the goal" if goal is not None else " that returns to its start" if return_to_start else "")
-        + ", counting loop closures with the poses of the map, not those among its own new poses; by flows in layers of "
+        + ", counting loop closures with the poses of the map, not those among its own new poses; by {} in layers of "
         f"{100 * delta:.3g} cm"
     )
     every = np.arange(len(layers.arcs.source), dtype=np.int32)
-    return FlowBound(prior, criterion, rewards, rewards.background(), vertices, max_length, whole - max_length, covers, every)
+    flows = FlowBound(
+        prior, criterion, rewards, rewards.background(), vertices, max_length, whole - max_length, covers.format("flows"), every
+    )
+    if objective == "error" or most != 1 or len(seen) > _MOST_IN_WINDOWS:
+        return flows, None
+    odometry = find_odometry(graph.group, ways, poses, graph.positions[pose], omega, sightings.first, delta, spacing)
+
+    def windows() -> tuple[Windows, Layers]:
+        size = spacing / 2
+        while True:
+            where = cells_of_pieces(ways, delta, size)
+            windows = Windows.of(prior, sightings, odometry, where, spacing, of_poses=counts_idle)
+            labels = windows.labels.astype(np.int32)
+            share = num_spots(ways, first_vertex, labels, delta, pieces_per_pose) / layers.num_spots
+            if share * len(every) < _ARCS_OF_WINDOWS or where.max() == 0:
+                return windows, build_layers(ways, first_vertex, remaining, is_end, whole, delta, pieces_per_pose, labels)
+            size *= 1.5
+
+    return flows, WindowBound(criterion, windows, rewards, vertices, max_length, covers.format("windows of two poses"))
 
 
 def _cells(ways: Ways, delta: float, size: float, most: int) -> Int32Array:
