@@ -85,9 +85,36 @@ def test_an_interrupted_benchmark_leaves_what_it_has(tiny, tmp_path, monkeypatch
     assert "interrupted" in capsys.readouterr().err
 
 
+def test_the_search_beside_its_peers_is_kept_and_continued(tmp_path, capsys):
+    options = ["--search", "--quick", "--objective", "map", "--paths", "3", "--seconds", "0.1", "--out", str(tmp_path / "new")]
+    assert run(["benchmark", "grid-3", *options]) == 0
+    shown = capsys.readouterr().out
+    for text in (
+        "grid-3: 9 poses, 4 m to the goal, map (nats), 1 seed",
+        "recursive greedy",
+        "this search, 0.1 s",
+        "search.json",
+    ):
+        assert text in shown
+    journal = (tmp_path / "new" / "journal.jsonl").read_text()
+    assert run(["benchmark", "grid-3", *options, "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document == json.loads((tmp_path / "new" / "search.json").read_text())
+    assert {row["peer"] for row in document["rows"]} >= {"shortest way", "best of 3 diverse paths", "random restarts"}
+    assert (tmp_path / "new" / "journal.jsonl").read_text() == journal
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        (["--search", "nowhere.g2o"], "nowhere.g2o: expected a pose graph, a map, a data set or grid-N, got no such file"),
+        (["--search", "grid-2"], "expected a grid from grid-3 to grid-40, got grid-2"),
+        (["--search", "--paths", "many"], 'expected --paths as whole numbers by commas, such as 20,200, got "many"'),
+        (["--search", "--seconds", "-1"], "expected deadlines of at least 0"),
+        (["--search", "--objective", "beauty"], "beauty"),
+        (["--search", "--goal", "1", "2"], "expected one place for a goal that is given, got 2"),
+        (["--search", "--sizes", "100"], "expected --search or --sizes, got both"),
+        (["--seeds", "2"], "expected --search together with --seeds, got --seeds alone"),
         (["no-such.g2o"], "no-such.g2o: expected a pose graph to read"),
         (["--sizes", "many"], 'expected --sizes as whole numbers by commas, such as 1000,10000, got "many"'),
         (["--sizes", "1"], "expected sizes of at least 2, got 1"),

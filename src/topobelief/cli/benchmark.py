@@ -1,19 +1,26 @@
-"""`topobelief benchmark`: how long decisions take, beside standard belief space planning, in one run."""
+"""`topobelief benchmark`: how long decisions take, beside standard belief space planning; or the search beside its peers."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from topobelief.cli.run_options import RetryFailed
+
 
 def benchmark(
     graph_files: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="[GRAPH]...", help="Pose graphs to measure besides generated ones, .g2o or .toro."),
+        typer.Argument(
+            metavar="[GRAPH]...",
+            help="Pose graphs to measure besides generated ones, .g2o or .toro. With --search: where to compare, grid-8 and "
+            "grid-16 if not given; also data sets by name, maps, and grid-N.",
+        ),
     ] = None,
     sizes: Annotated[
         str | None,
@@ -23,7 +30,7 @@ def benchmark(
     ] = None,
     candidates: Annotated[int | None, typer.Option(help="Candidates for each graph; 1000 if not given.", min=2)] = None,
     repeat: Annotated[int | None, typer.Option(help="Repetitions of each timing; 5 if not given.", min=1)] = None,
-    seed: Annotated[int, typer.Option(help="Seed of generated graphs and candidates.", min=0)] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of generated graphs and candidates; with --search, the first.", min=0)] = 0,
     quick: Annotated[
         bool, typer.Option("--quick", help="A small graph and few candidates, for a first look: about a minute.")
     ] = False,
@@ -31,16 +38,87 @@ def benchmark(
         bool, typer.Option("--cpu-time", help="Measure the processor's time, all threads together, where other programs run.")
     ] = False,
     out: Annotated[
-        Path | None, typer.Option(help="Folder for benchmark.json, and for a picture if there are two sizes or more.")
+        Path | None,
+        typer.Option(
+            help="Folder for benchmark.json, and for a picture if there are two sizes or more; with --search for search.json, "
+            "out/benchmark-search if not given."
+        ),
     ] = None,
+    search: Annotated[
+        bool,
+        typer.Option(
+            "--search", help="Compare the search over a roadmap with other ways to choose a walk, in place of all else."
+        ),
+    ] = False,
+    seeds: Annotated[int | None, typer.Option(help="With --search: number of seeds; 3 if not given.", min=1)] = None,
+    objective: Annotated[
+        list[str] | None,
+        typer.Option(help="With --search: what to minimise; repeat it for several. Error and map if not given."),
+    ] = None,
+    max_detour: Annotated[
+        float | None, typer.Option(help="With --search: longest walk in lengths of the shortest; 1.3 if not given.")
+    ] = None,
+    paths: Annotated[
+        str | None, typer.Option(help="With --search: numbers of diverse paths, comma-separated; 20,200,1000 if not given.")
+    ] = None,
+    seconds: Annotated[
+        str | None, typer.Option(help="With --search: deadlines of the search, comma-separated; 0.1,1,10 if not given.")
+    ] = None,
+    vertices: Annotated[
+        int | None, typer.Option(help="With --search: vertices of a roadmap, about; 1000 if not given.", min=2)
+    ] = None,
+    goal: Annotated[
+        tuple[float, float] | None,
+        typer.Option(metavar="X Y", help="With --search and one GRAPH: the goal, in place of a pose some 30 m away."),
+    ] = None,
+    retry_failed: RetryFailed = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")] = False,
 ) -> None:
     """Compare the speed of this engine with GTSAM, sparse factorisation from scratch and the determinant lemma.
 
     Prints ratios for all candidates first, set-up included, then memory, error bounds, proofs and kinds of candidates.
 
+    With --search: value, bound, evaluations and seconds of the search and its peers at each place, for each seed. Each place is
+    kept when it is done; killed at any moment, the same command continues.
+
     Other programs running on the machine distort the times, less so with --cpu-time. Needs the extras fast and gtsam.
     """
+    _refuse_others(
+        search,
+        {"--sizes": sizes, "--candidates": candidates, "--repeat": repeat},
+        {
+            "--seeds": seeds,
+            "--objective": objective,
+            "--max-detour": max_detour,
+            "--paths": paths,
+            "--seconds": seconds,
+            "--vertices": vertices,
+            "--goal": goal,
+            "--retry-failed": retry_failed or None,
+        },
+    )
+    if search:
+        from topobelief.cli.benchmark_search import SearchOptions, benchmark_search
+
+        benchmark_search(
+            SearchOptions(
+                sources=graph_files,
+                seeds=seeds,
+                first_seed=seed,
+                objectives=objective,
+                max_detour=max_detour,
+                paths=paths,
+                seconds=seconds,
+                vertices=vertices,
+                goal=goal,
+                quick=quick,
+                cpu_time=cpu_time,
+                retry_failed=retry_failed,
+                out=out,
+                as_json=as_json,
+            )
+        )
+        return
     from topobelief.cli.console import Reporter
     from topobelief.cli.extras import require_extras
     from topobelief.cli.plan_files import checked_folder
@@ -86,6 +164,19 @@ def benchmark(
             with atomic_file(folder / "benchmark.png") as path:
                 save_figure(figure, path)
             reporter.say(f"Time against size: {folder / 'benchmark.png'}")
+
+
+def _refuse_others(search: bool, of_times: Mapping[str, object], of_search: Mapping[str, object]) -> None:
+    """Options of the other benchmark are a mistake; none is left out in silence."""
+    from topobelief.errors import InvalidInputError
+
+    given = [name for name, value in (of_times if search else of_search).items() if value is not None]
+    if given:
+        raise InvalidInputError(
+            f"expected --search or {given[0]}, got both; leave one of them out"
+            if search
+            else f"expected --search together with {given[0]}, got {given[0]} alone"
+        )
 
 
 def parse_sizes(text: str) -> tuple[int, ...]:
