@@ -11,6 +11,8 @@ from topobelief.candidates.closure_rate import closure_rate, predicted_rate
 from topobelief.candidates.closure_replay import first_poses, replay_closures
 from topobelief.errors import InvalidInputError
 
+DATA_SETS = ("intel", "csail", "manhattan3500", "city10000", "ais2klinik", "kitti_05")
+
 
 def laps(count: int) -> tb.PoseGraph:
     """Rounds of 20 poses, from the second on closing with every second pose of the one before."""
@@ -49,7 +51,7 @@ def test_a_single_pose_has_no_end() -> None:
         replay_closures(tb.PoseGraph([(0, 0, 0)], np.zeros((0, 2), dtype=int), None, np.eye(3)))
 
 
-@pytest.mark.parametrize("name", [RECORDED, "intel.g2o", "csail.g2o", "manhattan3500.g2o", "kitti_05.g2o"])
+@pytest.mark.parametrize("name", [RECORDED, *(f"{name}.g2o" for name in DATA_SETS)])
 def test_by_default_no_path_gets_more_than_four_times_the_graphs_own_closures_a_pose(name: str) -> None:
     """Where most may be seen again: back along the end of the drive, along its beginning; 1 a pose where the graph has few."""
     graph = tb.read_g2o(data_file(name))

@@ -16,6 +16,8 @@ from topobelief.planning.planner import Planner
 from topobelief.planning.units import cell, shown_unit
 
 NUM_DRAWS = 30
+FEWEST_DRAWS = 10
+_MOST_CLOSURES = 5000  # expected, over all draws of a candidate; with more, draws take longer than all that came before
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,26 +44,39 @@ def spreads(
 ) -> list[Spread]:
     """Of the finalists whose closures are not certain; told in one line."""
     found: list[Spread] = []
+    chosen = finalists(decision, shortest)
+    number = num_draws(max(proposals.actions[index].expected_closures for index in chosen))
     with reporter.stage("draws"):
-        for index in finalists(decision, shortest):
+        for index in chosen:
             action = proposals.actions[index]
             if action.probabilities is None:
                 continue
             try:
-                drawn = drawn_values(planner, action, NUM_DRAWS, rng=np.random.default_rng(seed))
+                drawn = drawn_values(planner, action, number, rng=np.random.default_rng(seed))
             except TopobeliefError as error:
                 reporter.note(f"draws of closures: {decision.name(index)} could not be evaluated; {error}")
                 continue
             found.append(Spread(index, drawn.mean, drawn.std))
     if found:
-        reporter.say(_told(decision, found))
+        reporter.say(_told(decision, found, number))
     return found
 
 
-def _told(decision: Decision, found: Sequence[Spread]) -> str:
+def num_draws(expected_closures: float) -> int:
+    """How many draws are taken of candidates with up to so many closures.
+
+    Examples
+    --------
+    >>> num_draws(0.0), num_draws(130.0), num_draws(250.0), num_draws(900.0)
+    (30, 30, 20, 10)
+    """
+    return int(np.clip(_MOST_CLOSURES / max(expected_closures, 1.0), FEWEST_DRAWS, NUM_DRAWS))
+
+
+def _told(decision: Decision, found: Sequence[Spread], number: int) -> str:
     unit = decision.unit
     each = [f"{decision.name(one.action)} {cell(one.mean, unit)} ± {cell(one.std, unit)}" for one in found]
     return (
-        f"If each closure is made or not, by its probability ({NUM_DRAWS} draws), the {decision.quantity} in "
+        f"If each closure is made or not, by its probability ({number} draws), the {decision.quantity} in "
         f"{shown_unit(unit)} is: {', '.join(each)}."
     )

@@ -35,7 +35,8 @@ def inverse_trace(factor: FormFactor, nodes: IntArray, columns: FloatArray) -> E
     def add(first: int, last: int) -> None:
         for start in range(first, last, _COLUMNS):
             part = slice(start, min(start + _COLUMNS, last))
-            squares[part] = np.sum(_halves(factor, nodes, columns[:, :, part]) ** 2, axis=(0, 1))
+            half = _halves(factor, nodes, columns[:, :, part])
+            squares[part] = np.einsum("nbs,nbs->s", half, half)
 
     in_parallel(add, _bounds(columns.shape[2]))
     return _trace(factor, float(squares.sum()))
@@ -51,7 +52,7 @@ def solutions(factor: FormFactor, nodes: IntArray, columns: FloatArray) -> Solut
         for start in range(first, last, _COLUMNS):
             part = slice(start, min(start + _COLUMNS, last))
             work = _halves(factor, nodes, columns[:, :, part])
-            squares[part] = np.sum(work**2, axis=(0, 1))
+            squares[part] = np.einsum("nbs,nbs->s", work, work)
             solve_upper(tree.start, tree.rows, factor.diagonal, factor.blocks, work)
             values[tree.order, :, part] = work
 
