@@ -33,6 +33,7 @@ from topobelief.search.evaluations import Evaluations
 from topobelief.search.flow_bound import flow_bound
 from topobelief.search.front import on_front
 from topobelief.search.local_search import LocalSearch, spread_vias
+from topobelief.search.refinement import refine_best, with_way
 from topobelief.search.result import SearchResult, Way
 from topobelief.search.walks import Walk, Walks
 from topobelief.world import World
@@ -40,6 +41,7 @@ from topobelief.world import World
 _NUM_CANDIDATES = 60  # vertices to lead walks through
 _DIFFERENT = 0.05  # share of the length limit by which alternatives differ (Fréchet)
 _SAME_PLACE = 1e-9  # metres
+_SHARE_OF_REFINEMENT = 0.4  # of the time and of the evaluations
 _TO_MAKE_BOUND = 8e-6  # seconds for each metre of the limit and edge in reach: 5e-6 to 8e-6 on graphs of 3000 to 10 000 poses
 
 
@@ -65,6 +67,7 @@ def search_roadmap(
     information: ArrayLike | None = None,
     start: int | ArrayLike | Start | None = None,
     earlier: SearchResult | None = None,
+    refine: bool = False,
     seed: int = 0,
     on_progress: Callable[[SearchProgress], None] | None = None,
 ) -> SearchResult:
@@ -110,6 +113,9 @@ def search_roadmap(
         no lower bound.
     earlier
         A result on the same roadmap whose ways are tried too: after a search with a smaller limit the value is never worse.
+    refine
+        Whether to better the best walk off the vertices of the roadmap in the end (`refinement`), in 0.4 of the time. The bound
+        is about walks of the roadmap, so the way may turn out better than that.
     seed
         The same seed gives the same result, unless a deadline is set.
     on_progress
@@ -134,6 +140,8 @@ def search_roadmap(
     """
     began = time.monotonic()
     _check_numbers(max_detour, max_length, cost_per_metre, deadline, gap, enough, max_evaluations, num_alternatives)
+    if refine and earlier is not None and len(earlier.path) > 1:
+        roadmap, _ = with_way(roadmap, earlier.path)
     walks = _walks_within(roadmap, goal, max_detour, max_length, return_to_start)
     planner = Planner(graph, objective=objective, engine="incremental" if find_spec("numba") else "scratch")
     model = learn_closures(graph, world=world) if closures is None else closures
@@ -172,18 +180,25 @@ def search_roadmap(
 
     stay = Action(np.zeros((0, graph.poses.shape[1])), np.zeros((0, 2), np.int64), of_odometry)
     value_now = float(planner.entropies([stay])[0])
+    share = 1 - _SHARE_OF_REFINEMENT if refine else 1.0
     search = AnytimeSearch(
         evaluations,
         local,
         bound if turn is None and (deadline is None or _seconds_for_bound(walks) <= deadline) else None,
         began=began,
-        deadline=deadline,
+        deadline=None if deadline is None else share * deadline,
         gap=gap,
         enough=math.inf if enough is None else value_now - enough,
-        max_evaluations=max_evaluations,
+        max_evaluations=None if max_evaluations is None else math.ceil(share * max_evaluations),
         on_progress=on_progress,
     )
     stopped_by = search.run([walks.walk(()), *_walks_of(earlier, walks.roadmap)])
+    if refine and stopped_by not in ("enough", "interrupt"):
+        most = math.inf if max_evaluations is None else max_evaluations - len(evaluations)
+        end = math.inf if deadline is None else began + deadline
+        rng = np.random.default_rng(seed)
+        if refine_best(evaluations, walks.roadmap, walks.limit, rng=rng, most=most, end=end):
+            stopped_by = "interrupt"
 
     def way(walk: Walk) -> Way:
         return Way(evaluations.path(walk), evaluations.action(walk), evaluations.value(walk), evaluations.lengths[walk])
@@ -200,9 +215,9 @@ def search_roadmap(
         alternatives=tuple(way(walk) for walk in others),
         on_front=tuple(map(way, walks_on_front)),
         front=np.column_stack([lengths[front], objectives[front]]),
-        lower_bound=search.lower_bound,
+        lower_bound=min(search.lower_bound, evaluations.value(best)),
         covers=search.covers,
-        proven_optimal=search.proven,
+        proven_optimal=search.proven or evaluations.value(best) <= search.lower_bound,
         value_now=value_now,
         shortest=None if goal is None else way(walks.walk(())),
         max_length=walks.max_length,
