@@ -52,7 +52,9 @@ def test_the_document_is_what_the_library_finds(topobelief, office):
     graph = tb.optimize(tb.read_g2o(office.graph_file))
     world = tb.read_world(office.map_file)
     roadmap = tb.build_roadmap(world, graph.positions[-1], (0, 5), num_vertices=60)
-    found = tb.search_roadmap(graph, roadmap, goal=(0, 5), max_detour=1.5, world=world, max_evaluations=100, num_alternatives=5)
+    found = tb.search_roadmap(
+        graph, roadmap, goal=(0, 5), max_detour=1.5, world=world, max_evaluations=100, num_alternatives=5, refine=True
+    )
     searched, best = plan["search"], plan["actions"][plan["best"]]
     assert searched["path"] == best["waypoints"] == found.path.tolist()
     assert (searched["value"], searched["lower_bound"]) == pytest.approx((found.value, found.lower_bound), rel=1e-12)

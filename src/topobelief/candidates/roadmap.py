@@ -152,7 +152,7 @@ class Roadmap:
         if np.abs(ends - self.vertices[:2]).max() <= _SAME_PLACE:
             return self
         vertices = np.concatenate([ends, self.vertices])
-        joined = _free_edges(self.world, vertices, self.robot_radius, of=np.arange(2))
+        joined = free_edges(self.world, vertices, self.robot_radius, of=np.arange(2))
         edges = np.unique(np.concatenate([joined, self.edges + 2]), axis=0)
         roadmap = Roadmap(self.world, self.robot_radius, self.region, vertices, edges)
         if roadmap.shortest_path() is None:
@@ -215,7 +215,7 @@ def build_roadmap(
     drawn = _random_places(world, region, ends, draws, robot_radius, rng=np.random.default_rng(seed))
     spread = np.concatenate([places, drawn])
     unlinked = np.r_[0, 1, np.arange(len(places), len(spread))]
-    edges = np.concatenate([links, _free_edges(world, spread, robot_radius, of=unlinked)])
+    edges = np.concatenate([links, free_edges(world, spread, robot_radius, of=unlinked)])
     vertices = np.concatenate([spread, corners.places])
     roadmap = Roadmap(world, float(robot_radius), region, vertices, _each_once(edges))
     tight = world.clearance(places) < _ROOM_FOR_CORNERS * robot_radius
@@ -340,7 +340,7 @@ def _uniform(triangles: FloatArray, count: int, *, rng: np.random.Generator) -> 
     return a[chosen] + shares[0] * (b - a)[chosen] + shares[1] * (c - a)[chosen]
 
 
-def _free_edges(world: World, vertices: FloatArray, robot_radius: float, *, of: IntArray) -> IntArray:
+def free_edges(world: World, vertices: FloatArray, robot_radius: float, *, of: IntArray) -> IntArray:
     """Free edges from some vertices, shape (N,), to their nearest ones, each once; shape (E, 2)."""
     num_neighbours = math.ceil(1.5 * math.e * math.log(len(vertices)))  # k of PRM*, d = 2
     num_neighbours = min(num_neighbours, len(vertices) - 1)

@@ -191,6 +191,7 @@ def _search_one(
             spacing=rule.spacing,
             information=rule.information,
             start=begin,
+            refine=True,
             seed=rule.seed,
             on_progress=lambda progress: update(progress_told(progress, objective)),
         )

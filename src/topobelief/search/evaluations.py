@@ -31,24 +31,26 @@ class Evaluations:
         Its objective is the value.
     predict
     vertices : shape (V, 2)
-        Of the roadmap, metres.
+        Of the roadmap, metres; more may follow later.
     cost_per_metre
         In the unit of the objective; the value of a walk includes it.
     """
 
     def __init__(self, planner: Planner, predict: Predict, vertices: FloatArray, cost_per_metre: float) -> None:
-        self._planner, self._predict, self._vertices = planner, predict, vertices
+        self._planner, self._predict, self.vertices = planner, predict, vertices
         self.cost_per_metre = cost_per_metre
+        self._num_paths = 0  # evaluated that are no walks
         self.objectives: dict[Walk, float] = {}  # in the order of their evaluation, cost excluded
         self.lengths: dict[Walk, float] = {}  # metres
         self.sees_map = False  # whether a loop with the map is closed on any walk so far
 
     def __len__(self) -> int:
-        return len(self.objectives)
+        """How many exact evaluations were made."""
+        return len(self.objectives) + self._num_paths
 
     def path(self, walk: Walk) -> FloatArray:
         """Places that a walk passes, shape (waypoints, 2)."""
-        return self._vertices[list(walk)]
+        return self.vertices[list(walk)]
 
     def value(self, walk: Walk) -> float:
         """Of a walk that was evaluated, cost included."""
@@ -66,6 +68,12 @@ class Evaluations:
         for walk, path, value in zip(new, paths, values, strict=True):
             self.lengths[walk] = path_length(path)
             self.objectives[walk] = value
+
+    def values_of_paths(self, paths: list[FloatArray]) -> FloatArray:
+        """Values of paths that need not be walks, cost included; they are not kept."""
+        self._num_paths += len(paths)
+        lengths = np.array([path_length(path) for path in paths])
+        return self._planner.entropies(self._predict(paths)) + self.cost_per_metre * lengths
 
     def _closes_with_map(self, action: Action) -> bool:
         source, target = action.edges.T
@@ -113,7 +121,7 @@ class Evaluations:
     def different(self, order: Iterable[int], count: int, apart: float) -> list[Walk]:
         """The first `count` walks of an order that are more than a distance from each other (Fréchet, metres)."""
         walks, kept = list(self.objectives), list[Walk]()
-        distinct = DistinctPaths(self._vertices[np.linspace(0, len(self._vertices) - 1, _NUM_LANDMARKS).astype(int)])
+        distinct = DistinctPaths(self.vertices[np.linspace(0, len(self.vertices) - 1, _NUM_LANDMARKS).astype(int)])
         for index in order:
             path = self.path(walks[index])
             if not distinct.any_within(path, apart):

@@ -21,7 +21,8 @@ class Way(ReadOnlyArrays):
     Attributes
     ----------
     path : shape (waypoints, 2)
-        Metres, world frame; its waypoints are vertices of the roadmap. One waypoint: the robot stays where it is.
+        Metres, world frame; its waypoints are vertices of the roadmap, but for those of a way that was refined. One waypoint:
+        the robot stays where it is.
     action : Action
         What driving it adds to the graph; its cost is that of its length.
     value : float

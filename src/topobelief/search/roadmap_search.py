@@ -34,6 +34,7 @@ from topobelief.search.evaluations import Evaluations
 from topobelief.search.front import below_front, on_front
 from topobelief.search.front_bounds import FrontBounds
 from topobelief.search.local_search import LocalSearch, spread_vias
+from topobelief.search.refinement import refine_best, with_way
 from topobelief.search.result import SearchResult, Way
 from topobelief.search.walk_bounds import walk_bounds
 from topobelief.search.walks import Walk, Walks
@@ -42,6 +43,7 @@ from topobelief.world import World
 _NUM_CANDIDATES = 60  # vertices to lead walks through
 _DIFFERENT = 0.05  # share of the length limit by which alternatives differ (Fréchet)
 _SAME_PLACE = 1e-9  # metres
+_SHARE_OF_REFINEMENT = 0.4  # of the time and of the evaluations
 _TO_MAKE_BOUND = 8e-6  # seconds for each metre of the limit and edge in reach: 5e-6 to 8e-6 on graphs of 3000 to 10 000 poses
 
 
@@ -67,6 +69,7 @@ def search_roadmap(
     information: ArrayLike | None = None,
     start: int | ArrayLike | Start | None = None,
     earlier: SearchResult | None = None,
+    refine: bool = False,
     seed: int = 0,
     on_progress: Callable[[SearchProgress], None] | None = None,
     clock: Callable[[], float] = time.monotonic,
@@ -113,6 +116,9 @@ def search_roadmap(
         no lower bound.
     earlier
         A result on the same roadmap whose ways are tried too: after a search with a smaller limit the value is never worse.
+    refine
+        Whether to better the best walk off the vertices of the roadmap in the end (`refinement`), in 0.4 of the time. The bound
+        is about walks of the roadmap, so the way may turn out better than that.
     seed
         The same seed gives the same result, unless a deadline is set.
     on_progress
@@ -139,6 +145,8 @@ def search_roadmap(
     """
     began = clock()
     _check_numbers(max_detour, max_length, cost_per_metre, deadline, gap, enough, max_evaluations, num_alternatives)
+    if refine and earlier is not None and len(earlier.path) > 1:
+        roadmap, _ = with_way(roadmap, earlier.path)
     walks = _walks_within(roadmap, goal, max_detour, max_length, return_to_start)
     planner = Planner(graph, objective=objective, engine="incremental" if find_spec("numba") else "scratch")
     model = learn_closures(graph, world=world) if closures is None else closures
@@ -184,15 +192,16 @@ def search_roadmap(
         if on_progress is not None:
             on_progress(progress._replace(so_far=lambda: result("progress")))
 
+    share = 1 - _SHARE_OF_REFINEMENT if refine else 1.0
     search = AnytimeSearch(
         evaluations,
         local,
         bounds if turn is None and (deadline is None or _seconds_for_bound(walks) <= deadline) else None,
         began=began,
-        deadline=deadline,
+        deadline=None if deadline is None else share * deadline,
         gap=gap,
         enough=math.inf if enough is None else value_now - enough,
-        max_evaluations=max_evaluations,
+        max_evaluations=None if max_evaluations is None else math.ceil(share * max_evaluations),
         on_progress=told,
         clock=clock,
     )
@@ -214,11 +223,11 @@ def search_roadmap(
             on_front=tuple(map(way, walks_on_front)),
             front=np.column_stack([lengths[front], objectives[front]]),
             front_bounds=below_front(search.front_bounds, lengths[front], objectives[front]),
-            lower_bound=search.lower_bound,
+            lower_bound=min(search.lower_bound, evaluations.value(best)),
             covers=search.covers,
             bound_by=search.bound_by,
             value_with_map_alone=evaluations.value_with_map_alone(best),
-            proven_optimal=search.proven,
+            proven_optimal=search.proven or evaluations.value(best) <= search.lower_bound,
             value_now=value_now,
             shortest=None if goal is None else way(walks.walk(())),
             max_length=walks.max_length,
@@ -230,7 +239,14 @@ def search_roadmap(
             cost_per_metre=cost_per_metre,
         )
 
-    return result(search.run([walks.walk(()), *_walks_of(earlier, walks.roadmap)]))
+    stopped_by = search.run([walks.walk(()), *_walks_of(earlier, walks.roadmap)])
+    if refine and stopped_by not in ("enough", "interrupt"):
+        most = math.inf if max_evaluations is None else max_evaluations - len(evaluations)
+        end = math.inf if deadline is None else began + deadline
+        rng = np.random.default_rng(seed)
+        if refine_best(evaluations, walks.roadmap, walks.limit, rng=rng, most=most, end=end, clock=clock):
+            stopped_by = "interrupt"
+    return result(stopped_by)
 
 
 def _check_numbers(
