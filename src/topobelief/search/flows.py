@@ -13,6 +13,7 @@ from __future__ import annotations
 import heapq
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -21,7 +22,7 @@ from topobelief.arrays import FloatArray, IntArray
 from topobelief.linalg.block_cholesky import Int32Array
 from topobelief.search.criteria import Criterion
 from topobelief.search.cuts import best_line, best_place
-from topobelief.search.information_gain import gain_and_slopes
+from topobelief.search.information_gain import Slopes, gain_and_slopes
 from topobelief.search.longest_paths import arcs_above, arcs_to_ends, longest_path
 from topobelief.search.plans import Background, Mixture
 from topobelief.search.reduced_prior import ReducedPrior
@@ -91,6 +92,7 @@ class FlowBound:
         self._open: list[tuple[float, int, _Part]] = [(-math.inf, next(self._counter), whole)]
         self._slow_steps = _SLOW_STEPS[layers.num_labels > 1]
         self._arcs = arcs
+        self._suggested: list[IntArray] = []
         ends = rewards.delta * (np.arange(layers.num_layers) + 2.0) - lead_in
         self._longest = np.minimum(ends, max_length)  # metres, of walks that end in each layer or in the next one
         self.num_steps = 0
@@ -146,6 +148,10 @@ class FlowBound:
     def num_parts(self) -> int:
         """Into how many parts the walks that may be better than the best one known are split."""
         return len(self._open)
+
+    def suggest(self, walks: Sequence[IntArray]) -> None:
+        """Walks that are known to be good, as vertices of the roadmap; before the first step, which begins with them."""
+        self._suggested = list(walks)
 
     def prune(self, best_value: float) -> None:
         self._best = min(self._best, best_value)
@@ -219,8 +225,11 @@ class FlowBound:
                 break
             toll = following
         assert best is not None
+        latest = found[-1]
+        found += [course for walk in self._suggested if (course := self._course_of(walk, part, weights, slopes)) is not None]
+        self._suggested = []
         total, lengths, part.toll = best
-        part.ahead = total if not priced else max(slopes.of(found[-1].plan) - offset, 0.0)
+        part.ahead = total if not priced else max(slopes.of(latest.plan) - offset, 0.0)
         if priced:
             ahead = part.ahead if part.steps else 0.0
             rate_now = criterion.least_rate(gain, ahead)
@@ -246,6 +255,15 @@ class FlowBound:
         part.fresh += 1
         self._reweigh(part, found)
         return [walk for course in found if (walk := rewards.walk(course.arcs, self._vertices, self._max_length)) is not None]
+
+    def _course_of(self, walk: IntArray, part: _Part, weights: FloatArray, slopes: Slopes) -> Course | None:
+        """The longest path that drives the ways of a walk alone; None where there is none."""
+        ways, layers, size = self._rewards.ways, self._rewards.layers, int(self._vertices.max()) + 2
+        source, target = self._vertices[ways.source] + 1, self._vertices[ways.target] + 1  # 0: where the robot is
+        driven = np.isin(source * size + target, (walk[:-1] + 1) * size + walk[1:] + 1) | (source == 0)
+        which = np.append(driven, len(walk) == 1)[layers.arcs.way[part.arcs]]
+        longest = longest_path(layers, part.arcs[which], weights[which], np.zeros(len(ways.source)))
+        return None if longest.value == -math.inf else self._rewards.course(longest.arcs, slopes)
 
     def _tangent(self, gain: float, rate: float) -> float:
         """D at which the least value falls as fast as `rate`."""
