@@ -128,6 +128,7 @@ class AnytimeSearch:
                 if time.monotonic() >= self._end:
                     return "deadline"
                 if len(self._evaluations) >= self._most:
+                    self._bound_front()
                     return "evaluations"
                 moved = self._search_on()
                 if self._is_warm or not moved:
