@@ -190,3 +190,20 @@ def test_no_walk_of_any_length_is_below_the_bound_for_it(seed, objective):
         assert (below <= values + 1e-9 * np.maximum(1, np.abs(values))).all()
     if not case.cost_per_metre:
         assert bounds[-1] >= whole.lower_bound
+
+
+@pytest.mark.parametrize("objective", ["error", "map"])
+def test_walks_that_are_known_to_be_good_are_where_it_begins(objective):
+    """The flow is then as good as the best of them after the first step, and the bound still holds."""
+    case = random_case(17)
+    walks = case.walks()
+    values = case.values(objective, walks)
+    order = np.argsort(values)
+    bound, _ = walk_bounds(case.graph, case.roadmap, objective=objective, **case.arguments())
+    bound.suggest([walks[index] for index in order[:4]])
+    found = {tuple(walk.tolist()) for walk in bound.step()}
+    assert tuple(walks[order[0]].tolist()) in found
+    for _ in range(6):
+        bound.prune(float(values.min()))
+        bound.step()
+        assert bound.lower_bound <= values.min() + 1e-9 * abs(values.min())

@@ -13,6 +13,7 @@ from roadmap_walks import random_case
 from small_roadmaps import OPEN, drive, simple_walks, small_roadmap, values_of
 from topobelief.candidates.roadmap import Roadmap
 from topobelief.errors import InvalidInputError, NotOptimizedWarning
+from topobelief.search.flows import FlowBound
 from topobelief.search.result import SearchResult
 
 CLOSURES = tb.ClosureModel(radius=1.5, max_per_pose=2, probability=1.0, min_index_gap=3)
@@ -357,3 +358,44 @@ def test_what_closures_among_the_own_poses_of_a_way_gain_is_told():
     assert result.own_closures_gain > 1e-3
     without = search(graph, roadmap, goal=roadmap.vertices[1], max_detour=1.0)
     assert without.own_closures_gain == 0.0
+
+
+def test_no_step_of_the_bound_is_begun_that_would_end_after_the_deadline(monkeypatch):
+    """On a clock by which each step takes seven seconds."""
+    now, step = [0.0], FlowBound.step
+
+    class Clock:
+        monotonic = staticmethod(lambda: now[0])
+
+    def slow_step(self):
+        now[0] += 7.0
+        return step(self)
+
+    monkeypatch.setattr("topobelief.search.anytime.time", Clock)
+    monkeypatch.setattr("topobelief.search.roadmap_search.time", Clock)
+    monkeypatch.setattr(FlowBound, "step", slow_step)
+    graph, roadmap = scene(3)
+    result = search(graph, roadmap, goal=roadmap.vertices[1], max_detour=2.5, objective="error", turn=None, deadline=20.0)
+    assert result.stopped_by == "deadline"
+    assert now[0] == 14.0
+    assert math.isfinite(result.lower_bound)
+
+
+@pytest.mark.parametrize("cost", [0.0, 0.001])
+def test_the_front_has_bounds_that_fall_and_stay_below_it(cost):
+    graph, roadmap = scene(3)
+    options = {"goal": roadmap.vertices[1], "max_detour": 2.5, "turn": None, "cost_per_metre": cost, "objective": "error"}
+    result = search(graph, roadmap, max_evaluations=300, **options)
+    metres, bounds = result.front_bounds.T
+    assert (np.diff(metres) > 0).all()
+    assert (np.diff(bounds) <= 0).all()
+    assert metres[-1] == pytest.approx(result.max_length)
+    assert all(result.bound_within(length) <= value for length, value in result.front)
+    assert len(np.unique(bounds)) > 3
+    if not cost:
+        assert bounds[-1] >= result.lower_bound
+    limit = float(result.front[len(result.front) // 2, 0])
+    walks = simple_walks(roadmap, limit, end=1)
+    values = values_of(graph, roadmap, walks, objective="error", closures=CLOSURES)
+    assert result.bound_within(limit) <= values.min() + 1e-9 * abs(values.min())
+    assert search(graph, roadmap, **(options | {"turn": 100.0}), max_evaluations=100).front_bounds.shape == (0, 2)

@@ -30,6 +30,7 @@ _MOST_RESTARTS = 20  # without improvement, likewise
 _STEPS_PER_LOOK = 20  # of the bound, in which it closes at least
 _LEAST_PROGRESS = 0.05  # this share of the gap, or rests; with a deadline it goes on
 _STEPS_PER_FRONT_STEP = 3  # of the bound for one of the bounds of shorter walks
+_SUGGESTED = 8  # walks from which the bound begins
 _ONE_AS_LONG_AS = 3  # steps of a kind: the longest of so many says how long the next may take
 
 
@@ -134,6 +135,7 @@ class AnytimeSearch:
                 if self._clock() >= self._end:
                     return "deadline"
                 if len(self._evaluations) >= self._most:
+                    self._bound_front()
                     return "evaluations"
                 moved = self._search_on()
                 if self._is_warm or not moved:
@@ -170,6 +172,7 @@ class AnytimeSearch:
             return False
         if self._bound is None or self._front is None:
             self._bound, self._front = self._make_bounds()
+            self._bound.suggest([np.array(walk) for walk in self._evaluations.best_apart(_SUGGESTED)])
         if self._bound.finished or self._bound_rests:
             return False
         if not self._has_time_for("whole"):

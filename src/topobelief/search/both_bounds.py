@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal
 
 from topobelief.arrays import IntArray
@@ -38,6 +39,9 @@ class BothBounds:
         if self._windows is not None and self._flows.num_steps and not self._windows.finished:
             return self._windows.step()
         return self._flows.step()
+
+    def suggest(self, walks: Sequence[IntArray]) -> None:
+        self._flows.suggest(walks)
 
     def prune(self, best_value: float) -> None:
         self._flows.prune(best_value)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
 from topobelief.arrays import IntArray
@@ -40,6 +41,10 @@ class WalkBound(Protocol):
             Walks that came up, each as vertices of the roadmap from the start, within the length; candidates whose exact value
             is for the caller to find.
         """
+        ...
+
+    def suggest(self, walks: Sequence[IntArray]) -> None:
+        """Walks that are known to be good, as vertices of the roadmap, before the first step."""
         ...
 
     def prune(self, best_value: float) -> None:

@@ -16,7 +16,7 @@ from topobelief.world import World
 
 
 def compile_kernels() -> None:
-    """Those of decisions, of one small search to a goal and one to anywhere, and of parts of walks, which small searches lack."""
+    """Those of decisions, of one small search to a goal and one to anywhere, and of parts of walks."""
     of_decisions.compile_kernels()
     none = np.zeros(1, np.int32)
     allowed_arcs(Arcs(none, none, none, none, none, none, none), none, np.ones(1, dtype=bool))

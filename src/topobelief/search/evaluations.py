@@ -19,6 +19,7 @@ Predict = Callable[[list[FloatArray]], list[Action]]
 
 SAME_VALUE = 1e-9  # relative: values that differ by less are equal
 _NUM_LANDMARKS = 16
+_APART = 0.05
 _ROUNDING = 1e-9  # relative: lengths that differ by less are equal
 
 
@@ -117,6 +118,11 @@ class Evaluations:
         """The least objective of the walks of up to a length, cost excluded; inf where there is none."""
         values = [self.objectives[walk] for walk, metres in self.lengths.items() if metres <= length * (1 + _ROUNDING)]
         return min(values, default=math.inf)
+
+    def best_apart(self, count: int) -> list[Walk]:
+        """Some walks, the best of them first, each more than a twentieth of the longest one's length from the others."""
+        _, lengths, values = self.arrays()
+        return self.different(np.argsort(values, kind="stable").tolist(), count, _APART * float(lengths.max()))
 
     def different(self, order: Iterable[int], count: int, apart: float) -> list[Walk]:
         """The first `count` walks of an order that are more than a distance from each other (Fréchet, metres)."""

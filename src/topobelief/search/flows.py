@@ -13,19 +13,20 @@ from __future__ import annotations
 import heapq
 import itertools
 import math
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from topobelief.arrays import FloatArray, IntArray
 from topobelief.linalg.block_cholesky import Int32Array
 from topobelief.search.criteria import Criterion
-from topobelief.search.cuts import best_line, best_place
-from topobelief.search.information_gain import gain_and_slopes
+from topobelief.search.information_gain import Slopes, gain_and_slopes
 from topobelief.search.longest_paths import arcs_above, arcs_to_ends, longest_path
+from topobelief.search.parts import Part, split
 from topobelief.search.plans import Background, Mixture
 from topobelief.search.reduced_prior import ReducedPrior
-from topobelief.search.rewards import Course, Rewards, allowed_arcs, used_records
+from topobelief.search.rewards import Course, Rewards, used_records
 from topobelief.search.tolls import next_toll
 from topobelief.search.weights import best_weights
 
@@ -38,30 +39,6 @@ _STEPS_BEFORE_SPLIT = 3
 _SLOW = 0.15  # of what is missing to the value of the flow: a step that raises the bound by less is slow
 _CONVERGED = 0.25  # of what is missing to the best value: a part whose own optimum is known that well is split
 _SLOW_STEPS = (3, 8)  # after so many in a row a part is split too, with one cell and with several; a few more, and it is left
-_LEAST_WEIGHT = 1e-3  # of walks that count where parts are split
-_SMALL_WEIGHT = 0.05  # of all walks of the active set, where those that count agree
-
-
-@dataclass(eq=False, slots=True)
-class _Part:
-    """Some of the walks: those on paths of these arcs."""
-
-    arcs: Int32Array
-    records: Int32Array  # of the arcs, each once
-    courses: list[Course] = field(default_factory=list["Course"])
-    weights: FloatArray = field(default_factory=lambda: np.zeros(0))
-    by_layer: FloatArray = field(default_factory=lambda: np.zeros(0))  # bound of the walks that end up to each layer
-    toll: float = 0.0
-    ahead: float = 0.0  # D at the longest path
-    steps: int = 0
-    fresh: int = 0  # steps since it was made
-    slow: int = 0  # latest steps in a row that hardly raised the bound
-    is_ready: bool = False  # to be split
-
-    @property
-    def bound(self) -> float:
-        """Of all its walks."""
-        return float(self.by_layer[-1])
 
 
 class FlowBound:
@@ -87,10 +64,11 @@ class FlowBound:
         self._by_layer = np.full(layers.num_layers, -math.inf)
         self._counter = itertools.count()
         records = used_records(layers.arcs, arcs, len(layers.records.number))
-        whole = _Part(arcs, records, by_layer=self._by_layer)
-        self._open: list[tuple[float, int, _Part]] = [(-math.inf, next(self._counter), whole)]
+        whole = Part(arcs, records, by_layer=self._by_layer)
+        self._open: list[tuple[float, int, Part]] = [(-math.inf, next(self._counter), whole)]
         self._slow_steps = _SLOW_STEPS[layers.num_labels > 1]
         self._arcs = arcs
+        self._suggested: list[IntArray] = []
         ends = rewards.delta * (np.arange(layers.num_layers) + 2.0) - lead_in
         self._longest = np.minimum(ends, max_length)  # metres, of walks that end in each layer or in the next one
         self.num_steps = 0
@@ -147,6 +125,10 @@ class FlowBound:
         """Into how many parts the walks that may be better than the best one known are split."""
         return len(self._open)
 
+    def suggest(self, walks: Sequence[IntArray]) -> None:
+        """Walks that are known to be good, as vertices of the roadmap; before the first step, which begins with them."""
+        self._suggested = list(walks)
+
     def prune(self, best_value: float) -> None:
         self._best = min(self._best, best_value)
         self._criterion = self._criterion.compared_with(self._best)
@@ -160,7 +142,7 @@ class FlowBound:
         _, _, part = self._open[0]  # it stays there until its work is done, which may be interrupted
         parts = [part]
         if part.fresh >= _STEPS_BEFORE_SPLIT and part.is_ready:
-            halves = self._split(part)
+            halves = split(part, self._rewards)
             if halves is not None:
                 parts = halves
             elif part.slow >= self._slow_steps + 3:
@@ -181,7 +163,7 @@ class FlowBound:
         if min(least[-1], self._best) < math.inf:
             self._by_layer = np.maximum(self._by_layer, np.minimum(least, self._best))
 
-    def _improved(self, part: _Part) -> list[IntArray]:
+    def _improved(self, part: Part) -> list[IntArray]:
         """One step of Frank-Wolfe on a part: its bound, its walks, their weights."""
         criterion, rewards = self._criterion, self._rewards
         layers = rewards.layers
@@ -219,8 +201,11 @@ class FlowBound:
                 break
             toll = following
         assert best is not None
+        latest = found[-1]
+        found += [course for walk in self._suggested if (course := self._course_of(walk, part, weights, slopes)) is not None]
+        self._suggested = []
         total, lengths, part.toll = best
-        part.ahead = total if not priced else max(slopes.of(found[-1].plan) - offset, 0.0)
+        part.ahead = total if not priced else max(slopes.of(latest.plan) - offset, 0.0)
         if priced:
             ahead = part.ahead if part.steps else 0.0
             rate_now = criterion.least_rate(gain, ahead)
@@ -247,6 +232,15 @@ class FlowBound:
         self._reweigh(part, found)
         return [walk for course in found if (walk := rewards.walk(course.arcs, self._vertices, self._max_length)) is not None]
 
+    def _course_of(self, walk: IntArray, part: Part, weights: FloatArray, slopes: Slopes) -> Course | None:
+        """The longest path that drives the ways of a walk alone; None where there is none."""
+        ways, layers, size = self._rewards.ways, self._rewards.layers, int(self._vertices.max()) + 2
+        source, target = self._vertices[ways.source] + 1, self._vertices[ways.target] + 1  # 0: where the robot is
+        driven = np.isin(source * size + target, (walk[:-1] + 1) * size + walk[1:] + 1) | (source == 0)
+        which = np.append(driven, len(walk) == 1)[layers.arcs.way[part.arcs]]
+        longest = longest_path(layers, part.arcs[which], weights[which], np.zeros(len(ways.source)))
+        return None if longest.value == -math.inf else self._rewards.course(longest.arcs, slopes)
+
     def _tangent(self, gain: float, rate: float) -> float:
         """D at which the least value falls as fast as `rate`."""
         criterion = self._criterion
@@ -255,7 +249,7 @@ class FlowBound:
             return left * ((2 * rate * math.sqrt(left)) ** (-2 / 3) - 1)
         return criterion.size / 2 * (1 / rate - 1)
 
-    def _thin(self, part: _Part, weights: FloatArray, ahead: FloatArray, threshold: float) -> None:
+    def _thin(self, part: Part, weights: FloatArray, ahead: FloatArray, threshold: float) -> None:
         """Leave out arcs on no path that is longer than a threshold."""
         layers = self._rewards.layers
         kept = arcs_above(layers, part.arcs, weights, part.toll * self._rewards.driven, ahead, threshold)
@@ -263,7 +257,7 @@ class FlowBound:
             part.arcs = kept
             part.records = used_records(layers.arcs, kept, len(layers.records.number))
 
-    def _reweigh(self, part: _Part, found: list[Course]) -> None:
+    def _reweigh(self, part: Part, found: list[Course]) -> None:
         """Add walks to the active set and optimise all weights: a concave function over a simplex."""
         used = part.weights > 1e-4
         courses = [course for course, keep in zip(part.courses, used, strict=True) if keep] + found
@@ -286,76 +280,7 @@ class FlowBound:
 
         part.weights = best_weights(value, start, lengths, max(self._max_length, float(lengths.min())))
 
-    def _mixture(self, part: _Part) -> Mixture:
+    def _mixture(self, part: Part) -> Mixture:
         """The flow of a part; the background to begin with."""
         plans = [course.plan for course in part.courses]
         return Mixture(plans, part.weights, self._background, _BACKGROUND if plans else 1.0)
-
-    def _split(self, part: _Part) -> list[_Part] | None:
-        """Two parts of the walks, by what separates the weight of the active set best; None where its walks agree.
-
-        That is the side of a line on which one of the new poses stands, or the number of new poses.
-        """
-        layers = self._rewards.layers
-        for weights in (part.weights, np.maximum(part.weights, _SMALL_WEIGHT)):
-            line, count = self._dividing_line(part, weights), self._dividing_number(part, weights)
-            if line is not None or count is not None:
-                break
-        else:
-            return None
-        if count is None or (line is not None and line[0] >= count[0]):
-            assert line is not None
-            _, number, normal, at = line
-            which = part.records[layers.records.number[part.records] == number]
-            one, other = (ends @ normal for ends in self._rewards.places(which))
-            kept: list[Int32Array] = []
-            for side in (np.minimum(one, other) <= at, np.maximum(one, other) >= at):
-                allowed = np.ones(len(layers.records.number), dtype=bool)
-                allowed[which[~side]] = False
-                kept.append(allowed_arcs(layers.arcs, part.arcs, allowed))
-        else:
-            last = layers.arcs.last[part.arcs]
-            kept = [part.arcs[(last < 0) | (last <= count[1])], part.arcs[(last < 0) | (last > count[1])]]
-        return [self._restricted(part, arcs) for arcs in kept]
-
-    def _restricted(self, part: _Part, arcs: Int32Array) -> _Part:
-        """The walks of a part that take these arcs only."""
-        layers = self._rewards.layers
-        within = np.array([bool(np.isin(course.arcs, arcs, assume_unique=True).all()) for course in part.courses], dtype=bool)
-        courses = [course for course, keep in zip(part.courses, within, strict=True) if keep]
-        weights = part.weights[within]
-        total = float(weights.sum())
-        weights = weights / total if total > 0 else np.full(len(courses), 1 / max(len(courses), 1))
-        records = used_records(layers.arcs, arcs, len(layers.records.number))
-        return _Part(arcs, records, courses, weights, part.by_layer, part.toll)
-
-    def _dividing_line(self, part: _Part, shares: FloatArray) -> tuple[float, int, FloatArray, float] | None:
-        """Score, number of a new pose, unit vector, and where along it to cut."""
-        records = self._rewards.layers.records
-        best: tuple[float, int, FloatArray, float] | None = None
-        numbers = [records.number[course.records] for course in part.courses]
-        middles = [np.mean(self._rewards.places(course.records), axis=0) for course in part.courses]
-        for t in range(1, self._rewards.num_new + 1):
-            places: list[FloatArray] = []
-            weights: list[float] = []
-            for middle, number, weight in zip(middles, numbers, shares.tolist(), strict=True):
-                at = np.flatnonzero(number == t)
-                if at.size and weight > _LEAST_WEIGHT:
-                    places.append(middle[at[0]])
-                    weights.append(weight)
-            if len(places) < 2:
-                continue
-            cut = best_line(np.array(places), np.array(weights), self._rewards.delta)
-            if cut is not None and (best is None or cut[0] > best[0]):
-                best = cut[0], t, cut[1], cut[2]
-        return best
-
-    def _dividing_number(self, part: _Part, shares: FloatArray) -> tuple[float, int] | None:
-        """Score, and up to how many new poses the walks of one side have."""
-        used = shares > _LEAST_WEIGHT
-        number = np.array([course.plan.num_poses for course, keep in zip(part.courses, used, strict=True) if keep])
-        if len(number) < 2 or np.ptp(number) == 0:
-            return None
-        spacing = self._rewards.delta * self._rewards.layers.pieces_per_pose
-        cut = best_place(spacing * number, shares[used], 0.5 * spacing)
-        return None if cut is None else (cut[0], math.floor(cut[1] / spacing))

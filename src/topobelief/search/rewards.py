@@ -19,10 +19,10 @@ import numpy as np
 from topobelief.arrays import BoolArray, FloatArray, IntArray
 from topobelief.geometry import Group
 from topobelief.linalg.block_cholesky import Int32Array
-from topobelief.linalg.compiled import compiled
 from topobelief.search.information_gain import Slopes
 from topobelief.search.layers import Arcs, Layers
 from topobelief.search.plans import Background, Plan
+from topobelief.search.record_kernels import add_records, all_allowed, mark_records, value_arcs, value_records
 from topobelief.search.reduced_prior import world_to_body
 from topobelief.search.tolls import slack
 from topobelief.search.ways import Sightings, Ways
@@ -90,7 +90,7 @@ class Rewards:
         """Worth of some records, in a table of all of them."""
         worth = np.empty(len(self.layers.records.number))
         sightings, records = self.sightings, self.layers.records
-        _value_records(
+        value_records(
             used, records.number, records.way, records.piece, records.before, self.cells, self.ways.lengths, self.delta,
             slopes.odometry, self.powers, slopes.closures, sightings.first, sightings.start, sightings.poses, self.earliest,
             self.most, worth,
@@ -175,7 +175,7 @@ class Rewards:
         records, cells = layers.records, layers.num_labels
         shape = (self.num_new * cells, len(self.earliest))
         closures, links = np.zeros(shape), np.zeros((self.num_new, cells, cells, *self.idle.shape))
-        _add_records(
+        add_records(
             records.number, records.way, records.piece, records.before, self.cells, sightings.first, sightings.start,
             sightings.poses, self.earliest, self.powers[0], closures, links,
         )  # fmt: skip
@@ -223,158 +223,14 @@ def ways_along(layers: Layers, path: IntArray) -> IntArray:
 
 def arc_weights(arcs: Arcs, which: Int32Array, worth: FloatArray, charge: FloatArray, at_end: FloatArray) -> FloatArray:
     """Weights of some arcs: the worth of their records, less a charge for each way, and what ends a walk after each number."""
-    return _value_arcs(which, arcs.way, arcs.record, arcs.count, arcs.end, arcs.last, worth, charge, at_end)
+    return value_arcs(which, arcs.way, arcs.record, arcs.count, arcs.end, arcs.last, worth, charge, at_end)
 
 
 def used_records(arcs: Arcs, which: Int32Array, num_records: int) -> Int32Array:
     """Records of some arcs, each once."""
-    return np.flatnonzero(_marked(which, arcs.record, arcs.count, arcs.end, num_records)).astype(np.int32)
+    return np.flatnonzero(mark_records(which, arcs.record, arcs.count, arcs.end, num_records)).astype(np.int32)
 
 
 def allowed_arcs(arcs: Arcs, which: Int32Array, allowed: BoolArray) -> Int32Array:
     """Those arcs all of whose records are allowed."""
-    return which[_all_allowed(which, arcs.record, arcs.count, arcs.end, allowed)]
-
-
-@compiled
-def _marked(which: Int32Array, record: Int32Array, count: Int32Array, end: Int32Array, num_records: int) -> BoolArray:
-    marked = np.zeros(num_records, np.bool_)
-    for a in which:
-        for r in range(record[a], record[a] + count[a]):
-            marked[r] = True
-        if end[a] >= 0:
-            marked[end[a]] = True
-    return marked
-
-
-@compiled
-def _all_allowed(which: Int32Array, record: Int32Array, count: Int32Array, end: Int32Array, allowed: BoolArray) -> BoolArray:
-    result = np.zeros(len(which), np.bool_)
-    for i in range(len(which)):
-        a = which[i]
-        kept = end[a] < 0 or allowed[end[a]]
-        for r in range(record[a], record[a] + count[a]):
-            kept = kept and allowed[r]
-        result[i] = kept
-    return result
-
-
-@compiled
-def _value_records(
-    used: Int32Array,
-    number: Int32Array,
-    way: Int32Array,
-    piece: Int32Array,
-    before: Int32Array,
-    cells: Int32Array,
-    lengths: FloatArray,
-    delta: float,
-    odometry: FloatArray,
-    powers: FloatArray,
-    closures: FloatArray,
-    first: IntArray,
-    start: IntArray,
-    poses: IntArray,
-    earliest: IntArray,
-    most: int,
-    worth: FloatArray,
-) -> None:
-    """Worth of the records used: closures, and odometry at the better end of the piece."""
-    largest = np.zeros(most + 1)
-    kappa = odometry.shape[3]
-    for r in used:
-        t, e = number[r] - 1, way[r]
-        p = first[e] + piece[r]
-        begin = min(piece[r] * delta, lengths[e])
-        end = min((piece[r] + 1) * delta, lengths[e])
-        if p == first[e + 1] - 1:
-            begin = lengths[e]
-        cell = cells[p]
-        constant = linear = square = 0.0
-        for i in range(kappa):
-            for j in range(kappa):
-                slope = odometry[t, before[r], cell, i, j]
-                constant += slope * powers[0, e, i, j]
-                linear += slope * powers[1, e, i, j]
-                square += slope * powers[2, e, i, j]
-        row = t * odometry.shape[1] + cell
-        value = max(constant + begin * (linear + begin * square), constant + end * (linear + end * square))
-        if most == 0:
-            for q in range(start[p], start[p + 1]):
-                if earliest[poses[q]] <= number[r]:
-                    value += closures[row, poses[q]]
-        else:
-            for c in range(most):
-                largest[c] = 0.0
-            for q in range(start[p], start[p + 1]):
-                if earliest[poses[q]] <= number[r]:
-                    slope, c = closures[row, poses[q]], most - 1
-                    if slope > largest[c]:
-                        while c > 0 and largest[c - 1] < slope:
-                            largest[c] = largest[c - 1]
-                            c -= 1
-                        largest[c] = slope
-            for c in range(most):
-                value += largest[c]
-        worth[r] = value
-
-
-@compiled
-def _add_records(
-    number: Int32Array,
-    way: Int32Array,
-    piece: Int32Array,
-    before: Int32Array,
-    cells: Int32Array,
-    first: IntArray,
-    start: IntArray,
-    poses: IntArray,
-    earliest: IntArray,
-    odometry: FloatArray,
-    closures: FloatArray,
-    links: FloatArray,
-) -> None:
-    """Means of the closures of each pose in each cell, and of the odometry between cells, into tables of zeros."""
-    num_cells = links.shape[1]
-    count, times = np.zeros(len(closures)), np.zeros(links.shape[:3])
-    for r in range(len(number)):
-        t, p = number[r] - 1, first[way[r]] + piece[r]
-        row = t * num_cells + cells[p]
-        for q in range(start[p], start[p + 1]):
-            if earliest[poses[q]] <= number[r]:
-                closures[row, poses[q]] += 1.0
-        links[t, before[r], cells[p]] += odometry[way[r]]
-        count[row] += 1.0
-        times[t, before[r], cells[p]] += 1.0
-    for row in range(len(count)):
-        closures[row] /= max(count[row], 1.0)
-    for t in range(links.shape[0]):
-        for i in range(num_cells):
-            for j in range(num_cells):
-                links[t, i, j] /= max(times[t, i, j], 1.0)
-
-
-@compiled
-def _value_arcs(
-    which: Int32Array,
-    way: Int32Array,
-    record: Int32Array,
-    count: Int32Array,
-    end: Int32Array,
-    last: Int32Array,
-    worth: FloatArray,
-    charge: FloatArray,
-    remaining: FloatArray,
-) -> FloatArray:
-    values = np.empty(len(which))
-    for i in range(len(which)):
-        a = which[i]
-        value = -charge[way[a]] if way[a] >= 0 else 0.0
-        for r in range(record[a], record[a] + count[a]):
-            value += worth[r]
-        if end[a] >= 0:
-            value += worth[end[a]]
-        if last[a] >= 0:
-            value += remaining[last[a]]
-        values[i] = value
-    return values
+    return which[all_allowed(which, arcs.record, arcs.count, arcs.end, allowed)]

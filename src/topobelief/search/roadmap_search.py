@@ -44,7 +44,7 @@ _NUM_CANDIDATES = 60  # vertices to lead walks through
 _DIFFERENT = 0.05  # share of the length limit by which alternatives differ (Fréchet)
 _SAME_PLACE = 1e-9  # metres
 _SHARE_OF_REFINEMENT = 0.4  # of the time and of the evaluations
-_TO_MAKE_BOUND = 8e-6  # seconds for each metre of the limit and edge in reach: 5e-6 to 8e-6 on graphs of 3000 to 10 000 poses
+_TO_MAKE_BOUND = 1.2e-5  # seconds a metre of the limit and edge in reach: 0.8e-5 to 1.2e-5 on graphs of 3000 to 10 000 poses
 
 
 def search_roadmap(

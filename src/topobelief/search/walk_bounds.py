@@ -191,7 +191,7 @@ def walk_bounds(
     def windows() -> tuple[Windows, Layers]:
         size = spacing / 2
         while True:
-            where = cells_of_pieces(ways, delta, size)
+            where = cells_of_pieces(ways, delta, size).astype(np.int64)
             windows = Windows.of(prior, sightings, odometry, where, spacing, of_poses=counts_idle)
             labels = windows.labels.astype(np.int32)
             share = num_spots(ways, first_vertex, labels, delta, pieces_per_pose) / layers.num_spots

@@ -92,7 +92,8 @@ def find_odometry(
     begin = np.where(piece == np.diff(first)[way] - 1, length, np.minimum(piece * delta, length))
 
     def at(powers: FloatArray, u: FloatArray) -> FloatArray:
-        return sum(u[:, None, None] ** n * powers[n, way] for n in range(3))  # type: ignore[return-value]
+        along = u[:, None, None]
+        return powers[0, way] + along * (powers[1, way] + along * powers[2, way])
 
     powers = odometry_powers(group, poses, origin, information)
     middle = at(powers, (begin + end) / 2)
@@ -168,7 +169,7 @@ class Windows:
             prior, sightings, odometry, labels, first, pairs % len(prior.earliest), found % 3 != 1, spacing, of_poses
         )
 
-    def keys(self, number: IntArray, place: IntArray, before: IntArray) -> tuple[FloatArray, IntArray]:
+    def keys(self, number: IntArray, place: IntArray, before: IntArray) -> tuple[IntArray, IntArray]:
         """Different rows of a number that stands for that of the pose, its piece and the label before; and which is whose."""
         last = int(number.max(initial=1))
         stands_for = np.arange(last + 1)
@@ -182,20 +183,21 @@ class Windows:
         each = (stands_for[number] * len(self.labels) + place) * size + before
         different, which = np.unique(each, return_inverse=True)
         rest = different // size
-        return np.stack([rest // len(self.labels), rest % len(self.labels), different % size], axis=1), which
+        columns: list[IntArray] = [rest // len(self.labels), rest % len(self.labels), different % size]
+        return np.stack(columns, axis=1), which
 
     def values(self, keys: IntArray) -> FloatArray:
         """The most that a pose with each of some keys adds, nats."""
         prior, sightings = self.prior, self.sightings
         every = np.arange(len(prior.earliest))
         sigma = prior.sigma(every, every)
-        noise = np.linalg.inv(prior.closures)
+        noise: FloatArray = np.linalg.inv(prior.closures)
         worth = np.empty(len(keys))
         axes = (0,) * prior.tangent_dim
         for number in np.unique(keys[:, 0]).tolist():
             those = np.flatnonzero(keys[:, 0] == number)
             drift = self.odometry.drift(number - 1, self.spacing)
-            known = np.linalg.inv(prior.variances + drift + noise)
+            known: FloatArray = np.linalg.inv(prior.variances + drift + noise)
             worth[those] = _most_added(
                 axes, keys[those, 1], keys[those, 2], number, sigma, known, noise, prior.closures, drift,
                 self.odometry.least, self.odometry.before, sightings.start, sightings.poses, self.first, self.members,
