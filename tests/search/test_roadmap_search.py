@@ -207,6 +207,15 @@ def test_where_nothing_is_seen_again_the_result_says_so():
     assert "Nothing to gain" in to_goal.summary()
 
 
+def test_where_no_other_place_is_within_the_length_staying_is_proven():
+    graph, roadmap = scene(3)
+    result = search(graph, roadmap, max_length=1e-3, turn=None)
+    assert result.path.tolist() == [roadmap.vertices[0].tolist()]
+    assert (result.stopped_by, result.proven_optimal, result.gap) == ("proof", True, 0.0)
+    assert result.lower_bound == result.value == pytest.approx(result.value_now)
+    assert result.summary().startswith("Nothing to gain within 0.0 m")
+
+
 def test_a_deadline_of_no_time_gives_the_shortest_way():
     graph, roadmap = scene(3)
     result = search(graph, roadmap, goal=roadmap.vertices[1], max_detour=2.0, deadline=0.0)

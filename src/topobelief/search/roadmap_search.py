@@ -27,7 +27,7 @@ from topobelief.errors import InvalidInputError, PlanningError
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.planner import Planner
-from topobelief.search.anytime import AnytimeSearch, SearchProgress
+from topobelief.search.anytime import WARM_UP_SHARE, AnytimeSearch, SearchProgress
 from topobelief.search.bound import WalkBound
 from topobelief.search.evaluations import Evaluations
 from topobelief.search.flow_bound import flow_bound
@@ -96,7 +96,7 @@ def search_roadmap(
         In the unit of the objective: what a metre must gain to be worth driving.
     deadline
         Seconds from now, checked between batches of evaluations and steps of the bound; the best way so far is returned.
-        There is no lower bound where making it would take longer.
+        There is no lower bound where making it would take more than 0.6 of that.
     gap
         Stop when no walk can be better by more than this, in the unit of the objective.
     enough
@@ -173,12 +173,13 @@ def search_roadmap(
             pose=begin.pose,
         )
 
+    stays = walks.in_reach.sum() == 1  # there is one walk, to stay
     stay = Action(np.zeros((0, graph.poses.shape[1])), np.zeros((0, 2), np.int64), of_odometry)
     value_now = float(planner.entropies([stay])[0])
     search = AnytimeSearch(
         evaluations,
         local,
-        bound if turn is None and (deadline is None or _seconds_for_bound(walks) <= deadline) else None,
+        bound if turn is None and not stays and (deadline is None or _has_time_for_bound(walks, deadline)) else None,
         began=began,
         deadline=deadline,
         gap=gap,
@@ -204,16 +205,16 @@ def search_roadmap(
         alternatives=tuple(way(walk) for walk in others),
         on_front=tuple(map(way, walks_on_front)),
         front=np.column_stack([lengths[front], objectives[front]]),
-        lower_bound=search.lower_bound,
-        covers=search.covers,
-        proven_optimal=search.proven,
+        lower_bound=evaluations.value(best) if stays else search.lower_bound,
+        covers=f"the only walk of at most {walks.max_length:.6g} m, to stay" if stays else search.covers,
+        proven_optimal=search.proven or stays,
         value_now=value_now,
         shortest=None if goal is None else way(walks.walk(())),
         max_length=walks.max_length,
         sees_map=evaluations.sees_map,
         num_evaluations=len(evaluations),
         seconds=clock() - began,
-        stopped_by=stopped_by,
+        stopped_by="proof" if stays else stopped_by,
         objective=objective,
         cost_per_metre=cost_per_metre,
     )
@@ -247,10 +248,11 @@ def _check_numbers(
         raise InvalidInputError(f"expected num_alternatives of at least 0, got {num_alternatives}")
 
 
-def _seconds_for_bound(walks: Walks) -> float:
-    """About how long it takes before a bound knows anything."""
+def _has_time_for_bound(walks: Walks, deadline: float) -> bool:
+    """Whether a bound would know anything in about the time that is left to it."""
     edges = walks.in_reach[walks.roadmap.edges].all(axis=1)
-    return _TO_MAKE_BOUND * walks.max_length * int(np.count_nonzero(edges))
+    seconds = _TO_MAKE_BOUND * walks.max_length * int(np.count_nonzero(edges))
+    return seconds <= (1 - WARM_UP_SHARE) * deadline
 
 
 def _walks_within(
