@@ -152,9 +152,17 @@ def test_where_nothing_is_seen_again_staying_is_the_answer(topobelief, office):
     assert document(topobelief, to_goal(office, *no_closures))["best"] == 0
 
 
+def test_a_trip_too_short_for_any_other_place_is_proven_to_gain_nothing(topobelief, office):
+    arguments = trip(office, "--max-length", 0.001)
+    found = document(topobelief, arguments)["search"]
+    assert (len(found["path"]), found["lower_bound"]) == (1, found["value"])
+    assert "Nothing to gain within 0.0 m: no place in reach sees the map again." in topobelief(arguments).out
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
+        (["--goal", "0", "99", "--max-length", "50"], "expected a goal on the map"),
         (["--goal", "0", "5", "--max-length", "5"], "expected max_length of at least 11.5"),
         (["--goal", "0", "5", "--max-length", "20", "--candidates", "3"], "got --candidates, which compares a list"),
         (["--goal", "0", "5", "--max-length", "20", "--as-paper"], "got --as-paper, which compares a list"),

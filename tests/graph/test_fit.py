@@ -46,6 +46,11 @@ def test_candidates_on_such_a_graph_do_not_each_warn():
     assert len(warnings_of(lambda: [joint_entropy(graph) for graph in after], 2)) == 1
 
 
+def test_at_the_estimate_measurements_are_to_blame():
+    assert "optimise the graph first" in misfit(FAR)
+    assert "false loop closures" in misfit(FAR, optimized=True)
+
+
 @pytest.mark.parametrize(
     "graph",
     [

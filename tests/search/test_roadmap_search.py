@@ -210,11 +210,19 @@ def test_where_nothing_is_seen_again_the_result_says_so():
 
 def test_a_single_pose_has_no_error_to_lose():
     graph = tb.PoseGraph([[0.0, 0.0, 0.0]], np.zeros((0, 2), int), None, np.zeros((0, 3, 3)))
-    roadmap = Roadmap(np.array([[0.0, 0.0], [4.0, 0.0], [2.0, 1.0]]), np.array([[0, 1], [0, 2], [1, 2]]))
+    vertices = np.array([[0.0, 0.0], [4.0, 0.0], [2.0, 1.0]])
+    roadmap = Roadmap(OPEN, 0.1, OPEN.component((0.0, 0.0), 0.1), vertices, np.array([[0, 1], [0, 2], [1, 2]]))
     options = {"goal": (4, 0), "max_detour": 2.0, "objective": "error", "closures": CLOSURES, "information": np.eye(3)}
     found = tb.search_roadmap(graph, roadmap, **options)
     assert found.value == found.value_now == 0.0
     assert found.length == 4.0
+def test_where_no_other_place_is_within_the_length_staying_is_proven():
+    graph, roadmap = scene(3)
+    result = search(graph, roadmap, max_length=1e-3, turn=None)
+    assert result.path.tolist() == [roadmap.vertices[0].tolist()]
+    assert (result.stopped_by, result.proven_optimal, result.gap) == ("proof", True, 0.0)
+    assert result.lower_bound == result.value == pytest.approx(result.value_now)
+    assert result.summary().startswith("Nothing to gain within 0.0 m")
 
 
 def test_a_deadline_of_no_time_gives_the_shortest_way():

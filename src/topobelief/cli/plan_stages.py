@@ -62,7 +62,7 @@ def read_graph(path: Path, reporter: Reporter, *, optimized: bool, reading: Read
     reporter.say(f"{path}: {graph.num_poses} poses, {graph.num_edges} edges")
     if optimized:
         reporter.say(f"χ² per degree of freedom: {chi2_per_dof(filed)} as filed, {chi2_per_dof(graph)} optimised")
-    if message := misfit(graph):
+    if message := misfit(graph, optimized=optimized):
         reporter.note(f"{message}{'' if optimized else ' (leave out --no-optimize)'}.")
     return graph
 

@@ -17,13 +17,26 @@ from topobelief.graph.pose_graph import PoseGraph
 LARGEST_CHI2_PER_DOF = 100.0
 
 
-def misfit(graph: PoseGraph) -> str | None:
-    """A sentence on a graph that is far from its estimate; None for one that is not, and for a tree, which always fits."""
+def misfit(graph: PoseGraph, *, optimized: bool = False) -> str | None:
+    """A sentence on a graph that fits its measurements badly; None for one that does not, and for a tree, which always fits.
+
+    Parameters
+    ----------
+    graph
+    optimized
+        Whether it is known to be at its estimate, so that its measurements or their noise must be wrong.
+    """
     if graph.degrees_of_freedom <= 0 or graph.chi2 <= LARGEST_CHI2_PER_DOF * graph.degrees_of_freedom:
         return None
+    size = f"χ² per degree of freedom is about {graph.chi2 / graph.degrees_of_freedom:.0e}"
+    if optimized:
+        return (
+            f"{size} at the estimate, so measurements contradict each other far beyond their noise and entropies and bounds "
+            "mean little; look for false loop closures, or for noise that is claimed too small"
+        )
     return (
-        f"χ² per degree of freedom is about {graph.chi2 / graph.degrees_of_freedom:.0e}, so these poses are far from the "
-        "maximum-likelihood estimate and entropies and bounds taken at them mean little; optimise the graph first"
+        f"{size}, so these poses are far from the maximum-likelihood estimate and entropies and bounds taken at them mean "
+        "little; optimise the graph first"
     )
 
 

@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 Reason = Literal["proof", "gap", "enough", "deadline", "evaluations", "interrupt", "rest"]
 """Why a search stopped."""
 
-_BATCH = 64  # evaluations between two looks at the clock
+_FIRST_BATCH, _LARGEST_BATCH = 8, 64  # evaluations between two looks at the clock; batches double
 _WARM_UP = 400  # evaluations before the first step of the bound,
-_WARM_UP_SHARE = 0.4  # or this share of the time or of the evaluations that a search may take
+WARM_UP_SHARE = 0.4  # or this share of the time or of the evaluations that a search may take
 _PATIENCE = 1000  # evaluations without improvement after which local search rests
 _MOST_RESTARTS = 20  # without improvement, likewise
 _STEPS_PER_LOOK = 20  # of the bound, in which it closes at least
@@ -83,7 +83,7 @@ class AnytimeSearch:
         self._began, self._gap, self._enough, self._on_progress = began, gap, enough, on_progress
         self._clock = clock
         self._end = math.inf if deadline is None else began + deadline
-        self._warm = math.inf if deadline is None else began + _WARM_UP_SHARE * deadline
+        self._warm = math.inf if deadline is None else began + WARM_UP_SHARE * deadline
         self._most = math.inf if max_evaluations is None else max_evaluations
         self._bound: WalkBound | None = None
         self._front: FrontBounds | None = None
@@ -92,6 +92,7 @@ class AnytimeSearch:
         self._best = math.inf
         self._at_best = 0  # evaluations made when the best value was found
         self._restarts = 0  # of local search, since then
+        self._batch = _FIRST_BATCH
         self._bounds: list[float] = []  # after each step
 
     @property
@@ -152,18 +153,19 @@ class AnytimeSearch:
         """One batch of local search; whether there was anything left worth trying."""
         if len(self._evaluations) - self._at_best > _PATIENCE:
             return False
-        if self._local.step(_BATCH):
+        size, self._batch = self._batch, min(2 * self._batch, _LARGEST_BATCH)
+        if self._local.step(size):
             return True
         while self._restarts < _MOST_RESTARTS:
             self._restarts += 1
-            if self._local.restart(_BATCH):
+            if self._local.restart(size):
                 return True
-        return self._local.widen(_BATCH) > 0
+        return self._local.widen(size) > 0
 
     @property
     def _is_warm(self) -> bool:
         """Whether local search has found first values, or the bound would come too late otherwise."""
-        enough = min(_WARM_UP, _WARM_UP_SHARE * self._most)
+        enough = min(_WARM_UP, WARM_UP_SHARE * self._most)
         return len(self._evaluations) >= enough or self._clock() >= self._warm
 
     def _bound_on(self) -> bool:

@@ -27,7 +27,7 @@ from topobelief.errors import InvalidInputError, PlanningError
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.planner import Planner
-from topobelief.search.anytime import AnytimeSearch, SearchProgress
+from topobelief.search.anytime import WARM_UP_SHARE, AnytimeSearch, SearchProgress
 from topobelief.search.both_bounds import BothBounds
 from topobelief.search.bound import WalkBound
 from topobelief.search.evaluations import Evaluations
@@ -101,7 +101,7 @@ def search_roadmap(
         In the unit of the objective: what a metre must gain to be worth driving.
     deadline
         Seconds from now, checked between batches of evaluations and steps of the bound; the best way so far is returned.
-        There is no lower bound where making it would take longer.
+        There is no lower bound where making it would take more than 0.6 of that.
     gap
         Stop when no walk can be better by more than this, in the unit of the objective.
     enough
@@ -185,6 +185,7 @@ def search_roadmap(
         shortest = 0.0 if goal is None else float(walks.distances(walks.start)[walks.end or 0])
         return BothBounds(flows, windows), FrontBounds(flows, shortest, walks.max_length)
 
+    stays = walks.in_reach.sum() == 1  # there is one walk, to stay
     stay = Action(np.zeros((0, graph.poses.shape[1])), np.zeros((0, 2), np.int64), of_odometry)
     value_now = float(planner.entropies([stay])[0])
 
@@ -196,7 +197,7 @@ def search_roadmap(
     search = AnytimeSearch(
         evaluations,
         local,
-        bounds if turn is None and (deadline is None or _seconds_for_bound(walks) <= deadline) else None,
+        bounds if turn is None and not stays and (deadline is None or _has_time_for_bound(walks, deadline)) else None,
         began=began,
         deadline=None if deadline is None else share * deadline,
         gap=gap,
@@ -223,18 +224,18 @@ def search_roadmap(
             on_front=tuple(map(way, walks_on_front)),
             front=np.column_stack([lengths[front], objectives[front]]),
             front_bounds=below_front(search.front_bounds, lengths[front], objectives[front]),
-            lower_bound=min(search.lower_bound, evaluations.value(best)),
-            covers=search.covers,
+            lower_bound=evaluations.value(best) if stays else min(search.lower_bound, evaluations.value(best)),
+            covers=f"the only walk of at most {walks.max_length:.6g} m, to stay" if stays else search.covers,
             bound_by=search.bound_by,
             value_with_map_alone=evaluations.value_with_map_alone(best),
-            proven_optimal=search.proven or evaluations.value(best) <= search.lower_bound,
+            proven_optimal=search.proven or stays or evaluations.value(best) <= search.lower_bound,
             value_now=value_now,
             shortest=None if goal is None else way(walks.walk(())),
             max_length=walks.max_length,
             sees_map=evaluations.sees_map,
             num_evaluations=len(evaluations),
             seconds=clock() - began,
-            stopped_by=stopped_by,
+            stopped_by="proof" if stays else stopped_by,
             objective=objective,
             cost_per_metre=cost_per_metre,
         )
@@ -277,10 +278,11 @@ def _check_numbers(
         raise InvalidInputError(f"expected num_alternatives of at least 0, got {num_alternatives}")
 
 
-def _seconds_for_bound(walks: Walks) -> float:
-    """About how long it takes before a bound knows anything."""
+def _has_time_for_bound(walks: Walks, deadline: float) -> bool:
+    """Whether a bound would know anything in about the time that is left to it."""
     edges = walks.in_reach[walks.roadmap.edges].all(axis=1)
-    return _TO_MAKE_BOUND * walks.max_length * int(np.count_nonzero(edges))
+    seconds = _TO_MAKE_BOUND * walks.max_length * int(np.count_nonzero(edges))
+    return seconds <= (1 - WARM_UP_SHARE) * deadline
 
 
 def _walks_within(
