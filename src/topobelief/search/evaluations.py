@@ -32,10 +32,21 @@ class Evaluations:
         Of the roadmap, metres.
     cost_per_metre
         In the unit of the objective; the value of a walk includes it.
+    measure
+        What is minimised after each action, shape (K,), cost excluded. Default: the planner's objective, exactly.
     """
 
-    def __init__(self, planner: Planner, predict: Predict, vertices: FloatArray, cost_per_metre: float) -> None:
+    def __init__(
+        self,
+        planner: Planner,
+        predict: Predict,
+        vertices: FloatArray,
+        cost_per_metre: float,
+        *,
+        measure: Callable[[list[Action]], FloatArray] | None = None,
+    ) -> None:
         self._planner, self._predict, self._vertices = planner, predict, vertices
+        self._measure = measure or planner.entropies
         self.cost_per_metre = cost_per_metre
         self.objectives: dict[Walk, float] = {}  # in the order of their evaluation, cost excluded
         self.lengths: dict[Walk, float] = {}  # metres
@@ -59,7 +70,7 @@ class Evaluations:
             return
         paths = [self.path(walk) for walk in new]
         actions = self._predict(paths)
-        values = self._planner.entropies(actions).tolist()
+        values = self._measure(actions).tolist()
         self.sees_map = self.sees_map or any(self._closes_with_map(action) for action in actions)
         for walk, path, value in zip(new, paths, values, strict=True):
             self.lengths[walk] = path_length(path)

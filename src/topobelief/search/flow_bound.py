@@ -17,6 +17,7 @@ from topobelief.search.flows import FlowBound
 from topobelief.search.layers import build_layers
 from topobelief.search.reduced_prior import reduced_prior
 from topobelief.search.rewards import Rewards, odometry_powers
+from topobelief.search.topological_prior import OBJECTIVES, WeightForm, topological_prior
 from topobelief.search.ways import Ways, cells_of_pieces, find_sightings, first_pieces
 from topobelief.world import World
 
@@ -48,6 +49,7 @@ def flow_bound(
     pose: int | None = None,
     edge_costs: ArrayLike | None = None,
     pieces_per_pose: int | None = None,
+    metric: bool = True,
 ) -> FlowBound:
     """The bound over the walks from one vertex of a roadmap.
 
@@ -83,6 +85,8 @@ def flow_bound(
         What driving each edge costs beyond its length, in the unit of the objective: time, energy, risk.
     pieces_per_pose
         Into how many layers the spacing is cut. Default: as many as are affordable, from 4 to 40.
+    metric
+        False: of the objective as its signature estimates it (`topological_prior`); not for "per_pose".
 
     Raises
     ------
@@ -91,7 +95,7 @@ def flow_bound(
     PlanningError
         Where no walk within the length reaches the goal.
     """
-    require_choice("objective", objective, _OBJECTIVES)
+    require_choice("objective", objective, _OBJECTIVES if metric else OBJECTIVES)
     omega = np.asarray(information, dtype=np.float64)
     of_closures = omega if closure_information is None else np.asarray(closure_information, dtype=np.float64)
     pose = graph.num_poses - 1 if pose is None else pose
@@ -152,16 +156,31 @@ def flow_bound(
     num_new = max(1, int(layers.records.number.max(initial=1)))
     sightings = find_sightings(graph, ways, pose, delta, closures, world, num_new)
     seen = sightings.seen if len(sightings.seen) else np.array([pose])
-    prior = reduced_prior(
-        graph,
-        pose,
-        seen,
-        of_closures,
-        probability=closures.probability,
-        min_index_gap=closures.min_index_gap,
-        with_errors=objective == "error",
-    )
-    powers = odometry_powers(graph.group, ways.poses(graph, pose), graph.positions[pose], omega)
+    with_errors = objective == "error"
+    if metric:
+        prior = reduced_prior(
+            graph,
+            pose,
+            seen,
+            of_closures,
+            probability=closures.probability,
+            min_index_gap=closures.min_index_gap,
+            with_errors=with_errors,
+        )
+        powers = odometry_powers(graph.group, ways.poses(graph, pose), graph.positions[pose], omega)
+    else:
+        form = WeightForm.of(objective, graph, omega, of_closures)
+        prior = topological_prior(
+            graph,
+            pose,
+            seen,
+            of_closures,
+            form,
+            probability=closures.probability,
+            min_index_gap=closures.min_index_gap,
+            with_errors=with_errors,
+        )
+        powers = form.odometry_powers(omega, len(ways.source))
     idle = powers[0, 0] * float(counts_idle)
     fewest = max(0, math.ceil((whole - max_length + to_go[start]) / spacing - 1e-6))
     criterion = Criterion.of(objective, prior, idle, num_new, fewest)

@@ -129,7 +129,7 @@ class _Posterior:
         result = float(np.log(np.diagonal(self.root_core[0])).sum())
         if self.kind == "joint":
             result += float(np.log(self.root_new[0]).sum())
-        return result
+        return self.prior.multiplicity * result
 
     def slopes(self, seen: IntArray) -> Slopes:
         prior, kappa = self.prior, self.prior.tangent_dim
@@ -149,7 +149,7 @@ class _Posterior:
         else:
             among = rows - self.sigma @ known  # P_m',:
             free = _diagonal_blocks(prior.sigma, seen, kappa) - _products(rows, known, kappa)
-            scale = 0.5
+            scale = 0.5 * prior.multiplicity
         cross = -self.lever @ among  # new poses with seen ones
         each, odometry = self._among_new(-cross[:, own])
         cross = cross.reshape(len(self.variables), kappa, len(seen), kappa)

@@ -46,6 +46,8 @@ class ReducedPrior:
         K, square metres.
     mean_square
         Expected mean square error of the map now, square metres; nan without a kernel.
+    multiplicity
+        By which half a log-determinant is multiplied for an entropy (see `topological_prior`).
     """
 
     tangent_dim: int
@@ -56,6 +58,7 @@ class ReducedPrior:
     earliest: IntArray
     kernel: FloatArray | None
     mean_square: float
+    multiplicity: int = 1
 
 
 def reduced_prior(
@@ -92,7 +95,7 @@ def reduced_prior(
     alignment = Alignment.of(graph.positions, DEFAULT_SAMPLE_SIZE)
     sample = alignment.nodes if with_errors else np.zeros(0, dtype=np.int64)
     wanted = np.union1d(seen, sample)
-    rows = _inverse_root(factor, wanted)  # covariance of the wanted poses is rows rows^T, in (dp, dphi)
+    rows = inverse_root(factor, wanted)  # covariance of the wanted poses is rows rows^T, in (dp, dphi)
     group, kappa, k = graph.group, graph.tangent_dim, graph.group.position_dim
     seen_rows = to_twists(group, graph.positions[seen] - graph.positions[pose]) @ rows[np.searchsorted(wanted, seen)]
     flat = seen_rows.reshape(len(seen) * kappa, -1)
@@ -110,10 +113,15 @@ def reduced_prior(
         factor.log_det.value,
         flat @ flat.T,
         probability * adjoint.transpose(0, 2, 1) @ information @ adjoint,
-        np.where(seen > pose, 1, np.maximum(min_index_gap - (pose - seen), 1)),
+        earliest_numbers(seen, pose, min_index_gap),
         kernel,
         mean_square,
     )
+
+
+def earliest_numbers(seen: IntArray, pose: int, min_index_gap: int) -> IntArray:
+    """The first new pose that is far enough away along the way to close a loop with each seen one."""
+    return np.where(seen > pose, 1, np.maximum(min_index_gap - (pose - seen), 1))
 
 
 def to_twists(group: Group, offsets: FloatArray) -> FloatArray:
@@ -134,7 +142,7 @@ def world_to_body(group: Group, poses: FloatArray, origin: FloatArray) -> FloatA
     return group.adjoint(group.inverse(moved))
 
 
-def _inverse_root(factor: FormFactor, nodes: IntArray) -> FloatArray:
+def inverse_root(factor: FormFactor, nodes: IntArray) -> FloatArray:
     """X with X_s X_t^T = (M^-1)_st for some nodes of a form's matrix M, shape (w, b, c); the held node's is 0."""
     tree, b = factor.tree, factor.block_size
     at = tree.position[nodes]

@@ -23,10 +23,11 @@ from topobelief.candidates.learned_closures import learn_closures
 from topobelief.candidates.predicted_factors import closure_information, default_information, predict_actions
 from topobelief.candidates.roadmap import Roadmap
 from topobelief.candidates.start import Start, find_start
-from topobelief.errors import InvalidInputError, PlanningError
+from topobelief.errors import InvalidInputError, PlanningError, require_choice
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.planner import Planner
+from topobelief.planning.registry import default_signature
 from topobelief.search.anytime import AnytimeSearch, SearchProgress
 from topobelief.search.bound import WalkBound
 from topobelief.search.evaluations import Evaluations
@@ -34,6 +35,7 @@ from topobelief.search.flow_bound import flow_bound
 from topobelief.search.front import on_front
 from topobelief.search.local_search import LocalSearch, spread_vias
 from topobelief.search.result import SearchResult, Way
+from topobelief.search.topological_prior import OBJECTIVES, constant
 from topobelief.search.walks import Walk, Walks
 from topobelief.world import World
 
@@ -65,6 +67,7 @@ def search_roadmap(
     information: ArrayLike | None = None,
     start: int | ArrayLike | Start | None = None,
     earlier: SearchResult | None = None,
+    metric: bool = True,
     seed: int = 0,
     on_progress: Callable[[SearchProgress], None] | None = None,
 ) -> SearchResult:
@@ -110,6 +113,9 @@ def search_roadmap(
         no lower bound.
     earlier
         A result on the same roadmap whose ways are tried too: after a search with a smaller limit the value is never worse.
+    metric
+        False: topological planning. What is minimised and bounded is the objective as its signature estimates it, from topology
+        and weights alone: for "error" by effective resistance, for "map" and "joint" by spanning trees.
     seed
         The same seed gives the same result, unless a deadline is set.
     on_progress
@@ -125,7 +131,8 @@ def search_roadmap(
     PlanningError
         Where the limit is below the shortest way to the goal, or the goal cannot be joined to the roadmap.
     InvalidInputError
-        For a number out of range, without a goal and a `max_length`, and with a goal and `return_to_start`.
+        For a number out of range, without a goal and a `max_length`, with a goal and `return_to_start`, and for an objective
+        without a signature of its own where `metric` is False.
 
     Warns
     -----
@@ -135,7 +142,10 @@ def search_roadmap(
     began = time.monotonic()
     _check_numbers(max_detour, max_length, cost_per_metre, deadline, gap, enough, max_evaluations, num_alternatives)
     walks = _walks_within(roadmap, goal, max_detour, max_length, return_to_start)
-    planner = Planner(graph, objective=objective, engine="incremental" if find_spec("numba") else "scratch")
+    if not metric:
+        require_choice("objective of the topological form", objective, OBJECTIVES)
+    engine = "incremental" if find_spec("numba") else "scratch"
+    planner = Planner(graph, objective=objective, signature=default_signature(objective), engine=engine)
     model = learn_closures(graph, world=world) if closures is None else closures
     of_odometry, of_closures = (
         (default_information(graph), closure_information(graph)) if information is None else (np.asarray(information),) * 2
@@ -147,7 +157,12 @@ def search_roadmap(
             graph, paths, closures=model, information=information, spacing=spacing, turn=turn, world=world, start=begin
         )
 
-    evaluations = Evaluations(planner, predict, walks.roadmap.vertices, cost_per_metre)
+    def measure(actions: list[Action]) -> FloatArray:
+        if metric:
+            return planner.entropies(actions)
+        return constant(objective, graph) - planner.decide(actions, proof="none").signatures
+
+    evaluations = Evaluations(planner, predict, walks.roadmap.vertices, cost_per_metre, measure=measure)
     to_poses: FloatArray = np.asarray(KDTree(graph.positions[:, :2]).query(walks.roadmap.vertices)[0])
     candidates = spread_vias(walks, to_poses < model.radius, _NUM_CANDIDATES)
     local = LocalSearch(walks, evaluations, candidates, rng=np.random.default_rng(seed))
@@ -168,10 +183,11 @@ def search_roadmap(
             cost_per_metre=cost_per_metre,
             return_to_start=return_to_start,
             pose=begin.pose,
+            metric=metric,
         )
 
     stay = Action(np.zeros((0, graph.poses.shape[1])), np.zeros((0, 2), np.int64), of_odometry)
-    value_now = float(planner.entropies([stay])[0])
+    value_now = float(measure([stay])[0])
     search = AnytimeSearch(
         evaluations,
         local,
@@ -212,6 +228,7 @@ def search_roadmap(
         stopped_by=stopped_by,
         objective=objective,
         cost_per_metre=cost_per_metre,
+        metric=metric,
     )
 
 
