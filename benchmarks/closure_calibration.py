@@ -19,7 +19,8 @@ import numpy as np
 import topobelief as tb
 from topobelief.candidates.learned_closures import History
 from topobelief.candidates.predicted_factors import predict_actions
-from topobelief.simulation.episode import Episode, value_after
+from topobelief.simulation.decisions import value_after
+from topobelief.simulation.episode import Episode
 from topobelief.simulation.front_end import FrontEndSettings
 from topobelief.simulation.record import Record, RunOptions
 from topobelief.simulation.scenario import SCENARIO_NAMES, named_scenario

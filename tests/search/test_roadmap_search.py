@@ -216,6 +216,8 @@ def test_a_single_pose_has_no_error_to_lose():
     found = tb.search_roadmap(graph, roadmap, **options)
     assert found.value == found.value_now == 0.0
     assert found.length == 4.0
+
+
 def test_where_no_other_place_is_within_the_length_staying_is_proven():
     graph, roadmap = scene(3)
     result = search(graph, roadmap, max_length=1e-3, turn=None)
@@ -372,18 +374,14 @@ def test_no_step_of_the_bound_is_begun_that_would_end_after_the_deadline(monkeyp
     """On a clock by which each step takes seven seconds."""
     now, step = [0.0], FlowBound.step
 
-    class Clock:
-        monotonic = staticmethod(lambda: now[0])
-
     def slow_step(self):
         now[0] += 7.0
         return step(self)
 
-    monkeypatch.setattr("topobelief.search.anytime.time", Clock)
-    monkeypatch.setattr("topobelief.search.roadmap_search.time", Clock)
     monkeypatch.setattr(FlowBound, "step", slow_step)
     graph, roadmap = scene(3)
-    result = search(graph, roadmap, goal=roadmap.vertices[1], max_detour=2.5, objective="error", turn=None, deadline=20.0)
+    options = {"goal": roadmap.vertices[1], "max_detour": 2.5, "objective": "error", "turn": None, "deadline": 20.0}
+    result = search(graph, roadmap, clock=lambda: now[0], **options)
     assert result.stopped_by == "deadline"
     assert now[0] == 14.0
     assert math.isfinite(result.lower_bound)

@@ -11,7 +11,8 @@ import pytest
 from data_files import case_file
 from topobelief.candidates.closures import ClosureModel
 from topobelief.candidates.learned_closures import learn_closures
-from topobelief.simulation.episode import Episode, value_after
+from topobelief.simulation.decisions import value_after
+from topobelief.simulation.episode import Episode
 from topobelief.simulation.front_end import FrontEndSettings
 from topobelief.simulation.lidar import LidarSettings
 from topobelief.simulation.metrics import run_metrics, trajectory_error

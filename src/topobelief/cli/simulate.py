@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from topobelief.cli.choices import completed, one_of
 from topobelief.cli.run_options import DEFAULT_TIMEOUT, RetryFailed, Timeout
 from topobelief.planning.registry import OBJECTIVES, default_signature, unit_of
+
+if TYPE_CHECKING:
+    from topobelief.simulation.exploration import TripOptions
 
 _SCENARIO_HELP = "office, lab, corridors, or a .yaml of your own."
 ObjectiveName = Annotated[
@@ -62,6 +65,26 @@ def simulate(
     noise: Annotated[str, typer.Option(help=_NOISE_HELP)] = "physical",
     unknown: Annotated[bool, typer.Option("--unknown", help="Start with an empty map instead of the floor plan.")] = False,
     max_detour: MaxDetour = None,
+    explore: Annotated[
+        bool, typer.Option("--explore", help="After the goals: trips that improve the map most, until none gains enough.")
+    ] = False,
+    max_length: Annotated[
+        float | None,
+        typer.Option(metavar="M", help="With --explore: longest trip, metres.", show_default=False),
+    ] = None,
+    return_to_start: Annotated[bool, typer.Option("--return", help="With --explore: each trip ends where it begins.")] = False,
+    enough: Annotated[
+        float | None,
+        typer.Option(
+            metavar="GAIN",
+            help="With --explore: end when it is proven that no trip gains more, in the unit of the objective (metres, nats).",
+            show_default="0",
+        ),
+    ] = None,
+    trips: Annotated[
+        int | None,
+        typer.Option(min=0, metavar="N", help="With --explore: end after so many trips.", show_default="10"),
+    ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the run in --out from its last key pose.")] = False,
     displaced: Annotated[
         float, typer.Option(help="With --resume: how far ahead of its estimate the robot stands, metres.")
@@ -75,6 +98,8 @@ def simulate(
 ) -> None:
     """Drive a robot through a scenario: at each goal it plans on its graph and map, decides, and drives.
 
+    With --explore it then drives trips that improve the map, until it is certain that none gains enough.
+
     Ctrl-C leaves a complete result of what was driven, from which --resume continues.
     """
     from topobelief.cli.console import Reporter
@@ -87,7 +112,7 @@ def simulate(
         from topobelief.cli.interruption import stop_on_interrupt
         from topobelief.cli.plan_files import checked_folder
         from topobelief.errors import InvalidInputError
-        from topobelief.report.simulation_tables import leg_line, metrics_table
+        from topobelief.report.simulation_tables import exploration_line, leg_line, metrics_table, trips_table
         from topobelief.simulation.episode import Episode
         from topobelief.simulation.noise import parse_noise
         from topobelief.simulation.record import INTERRUPTED, RunOptions
@@ -108,6 +133,7 @@ def simulate(
             seed=seed,
             noise=parse_noise(noise),
             unknown=unknown,
+            trips=_trips(explore, max_length, return_to_start, enough, trips),
         )
         folder = out or Path("out") / place.name
         checked_folder(folder)
@@ -126,6 +152,8 @@ def simulate(
     for leg in record.legs:
         reporter.say(leg_line(leg))
     reporter.say(metrics_table(record))
+    if record.exploration is not None:
+        reporter.say(trips_table(record), exploration_line(record))
     if pictures or recording:
         with reporter.stage("pictures"):
             files.draw(record, pictures=pictures, recording=recording)
@@ -133,6 +161,35 @@ def simulate(
     reporter.answer(run_document(record))
     if record.outcome == INTERRUPTED:
         raise typer.Exit(130)
+
+
+def _trips(
+    explore: bool, max_length: float | None, return_to_start: bool, enough: float | None, trips: int | None
+) -> TripOptions | None:
+    """Which trips to drive; None for none.
+
+    Raises
+    ------
+    InvalidInputError
+        For options of trips without --explore, --explore without a length, and numbers out of range.
+    """
+    from topobelief.errors import InvalidInputError
+    from topobelief.simulation.exploration import TripOptions
+
+    if not explore:
+        given = {"--max-length": max_length, "--return": return_to_start or None, "--enough": enough, "--trips": trips}
+        for option, value in given.items():
+            if value is not None:
+                raise InvalidInputError(f"expected {option} together with --explore, got it alone")
+        return None
+    if max_length is None:
+        raise InvalidInputError("expected --max-length M with --explore, the longest trip in metres, got none")
+    return TripOptions(
+        max_length=max_length,
+        return_to_start=return_to_start,
+        enough=0.0 if enough is None else enough,
+        max_trips=10 if trips is None else trips,
+    )
 
 
 def simulate_compare(

@@ -8,7 +8,7 @@ from topobelief.cli.plan_files import write_together
 from topobelief.simulation.record import Record
 from topobelief.simulation.results import writers
 
-_STALE = ("leg-*.json", "leg-*.png", "run.png", "run.mcap")
+_STALE = ("leg-*.json", "leg-*.png", "run.png", "trips.png", "run.mcap")
 
 
 class RunFiles:
@@ -42,12 +42,15 @@ class RunFiles:
         """The run, each of its decisions, and the recording."""
         if pictures:
             from topobelief.report.canvas import save_figure
+            from topobelief.report.exploration_figure import draw_trips
             from topobelief.report.simulation_figures import draw_run, draw_topologies
 
             figures = {"run.png": draw_run(record)}
+            if record.exploration is not None:
+                figures["trips.png"] = draw_trips(record)
             for each in record.deliberations:
                 leg = record.legs[each.leg]
-                name = f"{record.scenario.name}, leg {each.leg + 1}, to goal {leg.goal}"
+                name = f"{record.scenario.name}, leg {each.leg + 1}, {'' if leg.trip else 'to '}{leg.name}"
                 figures[f"leg-{each.leg + 1}.png"] = draw_topologies(each, record.scenario.world, name=name)
             write_together(
                 self._folder,

@@ -10,24 +10,26 @@ from rich.table import Table
 from rich.text import Text
 
 from topobelief.objectives.objective import Objective
-from topobelief.planning.registry import OBJECTIVES, chosen
-from topobelief.planning.units import cell, shown_unit
+from topobelief.planning.registry import OBJECTIVES, chosen, unit_of
+from topobelief.planning.units import cell, quantity, shown_unit
 from topobelief.report.tables import quantity_table
 from topobelief.simulation.comparison import StrategySummary
+from topobelief.simulation.exploration import ENOUGH, TRIPS_DRIVEN, UNDECIDED
 from topobelief.simulation.metrics import run_metrics
 from topobelief.simulation.record import Leg, Record
+from topobelief.wording import counted
 
 
 def leg_line(leg: Leg) -> str:
-    """What was chosen on the way to a goal, and what came of it."""
-    head = f"goal {leg.goal}" if leg.goal else "approach"
+    """What was chosen on the way to a goal or for a trip, and what came of it."""
     chosen = f"path {leg.chosen} of {leg.num_candidates} ({leg.planned:.1f} m); " if leg.num_candidates else ""
     driven = ""
     if leg.driven_seconds:
         driven = f" after {leg.distance:.1f} m in {leg.driven_seconds:.0f} s with {leg.num_closures} loop closures"
     if not math.isnan(leg.goal_distance):
-        driven += f", {leg.goal_distance:.2f} m from the goal ({leg.believed_goal_distance:.2f} m as the robot believes)"
-    return f"{head}: {chosen}{leg.outcome}{driven}"
+        end = "its end" if leg.trip else "the goal"
+        driven += f", {leg.goal_distance:.2f} m from {end} ({leg.believed_goal_distance:.2f} m as the robot believes)"
+    return f"{leg.name}: {chosen}{leg.outcome}{driven}"
 
 
 def metrics_table(record: Record) -> Table:
@@ -62,6 +64,54 @@ def metrics_table(record: Record) -> Table:
         share = f", {values[name] / driven:.3%} of the time driven" if driven else ""
         rows.append((label, f"{values[name]:.3f} s{share}"))
     return quantity_table(f"{record.scenario.name}: {record.outcome}", rows)
+
+
+def trips_table(record: Record) -> Table:
+    """What each trip was predicted to gain, and what it gained."""
+    unit = unit_of(record.options.objective)
+    table = Table(
+        box=box.SIMPLE_HEAD,
+        padding=(0, 1),
+        pad_edge=False,
+        caption=f"{_quantity(record.options.objective)} of the map that stood before each trip, {shown_unit(unit)}",
+        caption_justify="left",
+    )
+    table.add_column("trip", no_wrap=True)
+    for name in ("metres", "closures", "before", "predicted", "achieved", "predicted gain", "achieved gain"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for leg in record.legs:
+        if leg.trip:
+            before, predicted, achieved = leg.prior_value, leg.predicted_value, leg.achieved_value
+            values = (before, predicted, achieved, before - predicted, before - achieved)
+            table.add_row(str(leg.trip), f"{leg.distance:.1f}", str(leg.num_closures), *(cell(value, unit) for value in values))
+    return table
+
+
+def exploration_line(record: Record) -> str:
+    """Why no more trips were driven, and what is known of the next one; empty where there were to be none."""
+    found, trips = record.exploration, record.options.trips
+    if found is None or trips is None:
+        return ""
+    after = f"after {counted(found.num_trips, 'trip')}"
+    if math.isnan(found.value_now):
+        return f"Trips ended {after}: {found.stopped_by}"
+    unit = unit_of(record.options.objective)
+    returning = " that returns" if trips.return_to_start else ""
+    improves = f"trip of up to {trips.max_length:g} m{returning} improves the {_quantity(record.options.objective)}"
+    most = "nothing is proven of the others" if math.isinf(found.most) else f"none by more than {quantity(found.most, unit)}"
+    best = f"the best {improves} by {quantity(max(found.gain, 0.0), unit)}, {most}"
+    asked = quantity(trips.enough, unit) if trips.enough else "anything"
+    if found.stopped_by == ENOUGH:
+        return f"Enough {after}: no {improves} by more than {asked}."
+    if found.stopped_by == UNDECIDED:
+        return f"Undecided {after}: {best}, where {asked} was asked for."
+    if found.stopped_by == TRIPS_DRIVEN:
+        return f"Stopped {after}, as many as were allowed: {best}."
+    return f"Trips ended {after}: {found.stopped_by}"
+
+
+def _quantity(objective: str) -> str:
+    return chosen(OBJECTIVES, objective).quantity
 
 
 def comparison_table(found: Sequence[StrategySummary], *, baseline: str, unit: str) -> Table:

@@ -197,15 +197,15 @@ class AnytimeSearch:
 
     def _take(self, step: Callable[[], list[IntArray]], kind: str) -> None:
         """One step of a kind; its walks are for local search."""
-        began = time.monotonic()
+        began = self._clock()
         walks = step()
-        self._took[kind].append(time.monotonic() - began)
+        self._took[kind].append(self._clock() - began)
         self._local.seed([tuple(walk.tolist()) for walk in walks])
 
     def _has_time_for(self, kind: str) -> bool:
         """Whether one more step of a kind would end before the deadline, if it takes as long as the last ones."""
         latest = self._took[kind][-_ONE_AS_LONG_AS:] or self._took["whole"][-_ONE_AS_LONG_AS:]
-        return time.monotonic() + max(latest, default=0.0) <= self._end
+        return self._clock() + max(latest, default=0.0) <= self._end
 
     @property
     def _bound_rests(self) -> bool:

@@ -21,7 +21,7 @@ import numpy as np
 from topobelief.arrays import FloatArray
 from topobelief.search.information_gain import Kind
 from topobelief.search.plans import Mixture, Plan
-from topobelief.search.reduced_prior import ReducedPrior
+from topobelief.search.topological_prior import SeenPrior
 
 _KINDS: dict[str, Kind] = {"map": "map", "joint": "joint", "per_pose": "joint", "error": "error"}
 
@@ -65,7 +65,7 @@ class Criterion:
     reference: float
 
     @staticmethod
-    def of(objective: str, prior: ReducedPrior, idle: FloatArray, num_new: int, fewest: int) -> Criterion:
+    def of(objective: str, prior: SeenPrior, idle: FloatArray, num_new: int, fewest: int) -> Criterion:
         """The criterion of an objective.
 
         Parameters
@@ -77,12 +77,12 @@ class Criterion:
             Odometry of idle poses.
         num_new, fewest
         """
-        kind, kappa = _KINDS[objective], prior.tangent_dim
+        kind, kappa = _KINDS[objective], prior.tangent_dim * prior.multiplicity
         each = kappa / 2 * math.log(2 * math.pi * math.e)
         start = prior.mean_square if kind == "error" else prior.num_free * each - prior.log_det / 2
         is_joint, per_pose = kind == "joint", objective == "per_pose"
         size = kappa * (len(prior.closures) + (num_new if is_joint else 0))
-        per_idle = float(np.linalg.slogdet(idle)[1]) / 2 if is_joint else 0.0
+        per_idle = prior.multiplicity * float(np.linalg.slogdet(idle)[1]) / 2 if is_joint else 0.0
         free_poses = prior.num_free if per_pose else 0
         price = float(free_poses + fewest) if per_pose else 1.0
         reference = start / max(free_poses, 1) if per_pose else 0.0

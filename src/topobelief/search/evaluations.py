@@ -35,10 +35,21 @@ class Evaluations:
         Of the roadmap, metres; more may follow later.
     cost_per_metre
         In the unit of the objective; the value of a walk includes it.
+    measure
+        What is minimised after each action, shape (K,), cost excluded. Default: the planner's objective, exactly.
     """
 
-    def __init__(self, planner: Planner, predict: Predict, vertices: FloatArray, cost_per_metre: float) -> None:
+    def __init__(
+        self,
+        planner: Planner,
+        predict: Predict,
+        vertices: FloatArray,
+        cost_per_metre: float,
+        *,
+        measure: Callable[[list[Action]], FloatArray] | None = None,
+    ) -> None:
         self._planner, self._predict, self.vertices = planner, predict, vertices
+        self._measure = measure or planner.entropies
         self.cost_per_metre = cost_per_metre
         self._num_paths = 0  # evaluated that are no walks
         self.objectives: dict[Walk, float] = {}  # in the order of their evaluation, cost excluded
@@ -64,7 +75,7 @@ class Evaluations:
             return
         paths = [self.path(walk) for walk in new]
         actions = self._predict(paths)
-        values = self._planner.entropies(actions).tolist()
+        values = self._measure(actions).tolist()
         self.sees_map = self.sees_map or any(self._closes_with_map(action) for action in actions)
         for walk, path, value in zip(new, paths, values, strict=True):
             self.lengths[walk] = path_length(path)
@@ -74,7 +85,7 @@ class Evaluations:
         """Values of paths that need not be walks, cost included; they are not kept."""
         self._num_paths += len(paths)
         lengths = np.array([path_length(path) for path in paths])
-        return self._planner.entropies(self._predict(paths)) + self.cost_per_metre * lengths
+        return self._measure(self._predict(paths)) + self.cost_per_metre * lengths
 
     def _closes_with_map(self, action: Action) -> bool:
         source, target = action.edges.T
@@ -100,7 +111,7 @@ class Evaluations:
         if kept.all():
             return self.value(walk)
         without = Action(action.poses, action.edges[kept], action.information[kept], length=action.length)
-        return float(self._planner.entropies([without])[0]) + action.cost
+        return float(self._measure([without])[0]) + action.cost
 
     def arrays(self) -> tuple[list[Walk], FloatArray, FloatArray]:
         """All walks evaluated so far, their lengths (metres) and values, in the order of their evaluation."""

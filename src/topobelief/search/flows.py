@@ -25,9 +25,9 @@ from topobelief.search.information_gain import Slopes, gain_and_slopes
 from topobelief.search.longest_paths import arcs_above, arcs_to_ends, longest_path
 from topobelief.search.parts import Part, split
 from topobelief.search.plans import Background, Mixture
-from topobelief.search.reduced_prior import ReducedPrior
 from topobelief.search.rewards import Course, Rewards, used_records
 from topobelief.search.tolls import next_toll
+from topobelief.search.topological_prior import SeenPrior
 from topobelief.search.weights import best_weights
 
 _ROUNDING = 1e-9  # relative; bounds are lowered by it
@@ -46,7 +46,7 @@ class FlowBound:
 
     def __init__(
         self,
-        prior: ReducedPrior,
+        prior: SeenPrior,
         criterion: Criterion,
         rewards: Rewards,
         background: Background,

@@ -28,7 +28,8 @@ from scipy.linalg import cho_factor, cho_solve, cho_solve_banded, cholesky_bande
 from topobelief.arrays import FloatArray, IntArray
 from topobelief.errors import IllConditionedError
 from topobelief.search.plans import Background, Mixture, Plan, alone
-from topobelief.search.reduced_prior import ReducedPrior, in_blocks
+from topobelief.search.reduced_prior import in_blocks
+from topobelief.search.topological_prior import SeenPrior
 
 Kind = Literal["map", "joint", "error"]
 _JITTER = 1e-13  # relative; added to a covariance that is singular to rounding
@@ -66,13 +67,13 @@ class Slopes:
         return float(np.vdot(self.closures, background.closures) + of_odometry)
 
 
-def gain(prior: ReducedPrior, kind: Kind, plan: Plan | Mixture) -> float:
+def gain(prior: SeenPrior, kind: Kind, plan: Plan | Mixture) -> float:
     """What a plan gains."""
     return _Posterior(prior, kind, plan).gain
 
 
 def gain_and_slopes(
-    prior: ReducedPrior, kind: Kind, plan: Plan | Mixture, *, among: IntArray | None = None
+    prior: SeenPrior, kind: Kind, plan: Plan | Mixture, *, among: IntArray | None = None
 ) -> tuple[float, Slopes]:
     """What a plan gains, and the gradient there.
 
@@ -89,7 +90,7 @@ def gain_and_slopes(
 class _Posterior:
     """Information after a plan, the new poses eliminated; notation as above."""
 
-    def __init__(self, prior: ReducedPrior, kind: Kind, plan: Plan | Mixture) -> None:
+    def __init__(self, prior: SeenPrior, kind: Kind, plan: Plan | Mixture) -> None:
         self.prior, self.kind = prior, kind
         mixture = alone(plan) if isinstance(plan, Plan) else plan
         kappa, background = prior.tangent_dim, mixture.background
@@ -134,7 +135,7 @@ class _Posterior:
         result = float(np.log(np.diagonal(self.root_core[0])).sum())
         if self.kind == "joint":
             result += float(np.log(self.root_new[0]).sum())
-        return result
+        return self.prior.multiplicity * result
 
     def slopes(self, seen: IntArray) -> Slopes:
         prior, kappa = self.prior, self.prior.tangent_dim
@@ -151,7 +152,7 @@ class _Posterior:
         else:
             among = rows - self.sigma @ known  # P_m',:
             free = prior.variances[seen] - _products(rows, known, kappa)
-            scale = 0.5
+            scale = 0.5 * prior.multiplicity
         cross = -self.lever @ among  # new poses with seen ones
         each, odometry = self._among_new(-cross[:, own])
         cross = cross.reshape(len(self.variables), kappa, len(seen), kappa)

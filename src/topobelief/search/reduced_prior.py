@@ -49,7 +49,11 @@ class ReducedPrior:
         Expected mean square error of the map now, square metres; nan where it is not asked for.
     kernel_variances : shape (m, kappa, kappa)
         Diagonal blocks of K; nothing where errors are not asked for.
+    multiplicity
+        By which half a log-determinant is multiplied for an entropy (see `topological_prior`).
     """
+
+    multiplicity = 1
 
     def __init__(
         self,
@@ -90,7 +94,7 @@ class ReducedPrior:
         self.tangent_dim, self.num_free, self.log_det = kappa, graph.num_poses - 1, factor.log_det.value
         adjoint = world_to_body(group, graph.poses[seen], graph.positions[pose])
         self.closures = probability * adjoint.transpose(0, 2, 1) @ information @ adjoint
-        self.earliest = np.where(seen > pose, 1, np.maximum(min_index_gap - (pose - seen), 1))
+        self.earliest = earliest_numbers(seen, pose, min_index_gap)
         self.variances = self._twists @ _variances(factor, seen) @ self._twists.transpose(0, 2, 1)
         self.mean_square, self._effects = np.nan, np.zeros((len(seen) * kappa, 0))
         if with_errors:
@@ -144,6 +148,11 @@ def _variances(factor: FormFactor, nodes: IntArray) -> FloatArray:
         place = int(np.searchsorted(places, at[node]))
         result[node] = paths.inverse_block(place, place)
     return result
+
+
+def earliest_numbers(seen: IntArray, pose: int, min_index_gap: int) -> IntArray:
+    """The first new pose that is far enough away along the way to close a loop with each seen one."""
+    return np.where(seen > pose, 1, np.maximum(min_index_gap - (pose - seen), 1))
 
 
 def to_twists(group: Group, offsets: FloatArray) -> FloatArray:

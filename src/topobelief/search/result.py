@@ -87,6 +87,8 @@ class SearchResult(ReadOnlyArrays):
         more; "progress" of a search that goes on.
     objective : str
     cost_per_metre : float
+    metric : bool
+        Whether values are those of the objective; else they are its signature's estimates of it.
     """
 
     best: Way
@@ -108,6 +110,7 @@ class SearchResult(ReadOnlyArrays):
     stopped_by: str
     objective: str
     cost_per_metre: float
+    metric: bool = True
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "front", frozen_floats(self.front, name="front"))
@@ -167,7 +170,11 @@ class SearchResult(ReadOnlyArrays):
         after = said(self.best.value - self.best.action.cost, self.objective)
         now = said(self.value_now, self.objective)
         found = f"The best way found is {self.length:.1f} m long and closes {closures} {noun}"
-        return f"{found}: {_NAMES[self.objective]} {after}, now {now}."
+        return f"{found}: {self._name} {after}, now {now}."
+
+    @property
+    def _name(self) -> str:
+        return _NAMES[self.objective] if self.metric else f"{_NAMES[self.objective]} by {_SIGNATURES[self.objective]}"
 
     def _comparison(self) -> list[str]:
         if self.shortest is None or self.shortest.length >= self.length:
@@ -198,7 +205,7 @@ class SearchResult(ReadOnlyArrays):
             f"<tr><td>{metres:.1f}</td><td>{said(value, self.objective)}</td></tr>"
             for metres, value in self.few_on_front(5).tolist()
         )
-        head = f"<tr><th>up to (m)</th><th>{_NAMES[self.objective]}</th></tr>"
+        head = f"<tr><th>up to (m)</th><th>{self._name}</th></tr>"
         return f"<p>{self.summary()}</p><table>{head}{rows}</table>"
 
     def few_on_front(self, count: int) -> FloatArray:
@@ -216,6 +223,9 @@ _NAMES = {
     "joint": "joint entropy",
     "per_pose": "joint entropy per pose",
 }
+
+
+_SIGNATURES = {"error": "effective resistance", "map": "spanning trees", "joint": "spanning trees"}
 
 
 def said(value: float, objective: str) -> str:

@@ -23,10 +23,11 @@ from topobelief.candidates.learned_closures import learn_closures
 from topobelief.candidates.predicted_factors import closure_information, default_information, predict_actions
 from topobelief.candidates.roadmap import Roadmap
 from topobelief.candidates.start import Start, find_start
-from topobelief.errors import InvalidInputError, PlanningError
+from topobelief.errors import InvalidInputError, PlanningError, require_choice
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.planner import Planner
+from topobelief.planning.registry import default_signature
 from topobelief.search.anytime import WARM_UP_SHARE, AnytimeSearch, SearchProgress
 from topobelief.search.both_bounds import BothBounds
 from topobelief.search.bound import WalkBound
@@ -36,6 +37,7 @@ from topobelief.search.front_bounds import FrontBounds
 from topobelief.search.local_search import LocalSearch, spread_vias
 from topobelief.search.refinement import refine_best, with_way
 from topobelief.search.result import SearchResult, Way
+from topobelief.search.topological_prior import OBJECTIVES, constant
 from topobelief.search.walk_bounds import walk_bounds
 from topobelief.search.walks import Walk, Walks
 from topobelief.world import World
@@ -70,6 +72,7 @@ def search_roadmap(
     start: int | ArrayLike | Start | None = None,
     earlier: SearchResult | None = None,
     refine: bool = False,
+    metric: bool = True,
     seed: int = 0,
     on_progress: Callable[[SearchProgress], None] | None = None,
     clock: Callable[[], float] = time.monotonic,
@@ -119,6 +122,9 @@ def search_roadmap(
     refine
         Whether to better the best walk off the vertices of the roadmap in the end (`refinement`), in 0.4 of the time. The bound
         is about walks of the roadmap, so the way may turn out better than that.
+    metric
+        False: topological planning. What is minimised and bounded is the objective as its signature estimates it, from topology
+        and weights alone: for "error" by effective resistance, for "map" and "joint" by spanning trees.
     seed
         The same seed gives the same result, unless a deadline is set.
     on_progress
@@ -136,7 +142,8 @@ def search_roadmap(
     PlanningError
         Where the limit is below the shortest way to the goal, or the goal cannot be joined to the roadmap.
     InvalidInputError
-        For a number out of range, without a goal and a `max_length`, and with a goal and `return_to_start`.
+        For a number out of range, without a goal and a `max_length`, with a goal and `return_to_start`, and for an objective
+        without a signature of its own where `metric` is False.
 
     Warns
     -----
@@ -148,7 +155,10 @@ def search_roadmap(
     if refine and earlier is not None and len(earlier.path) > 1:
         roadmap, _ = with_way(roadmap, earlier.path)
     walks = _walks_within(roadmap, goal, max_detour, max_length, return_to_start)
-    planner = Planner(graph, objective=objective, engine="incremental" if find_spec("numba") else "scratch")
+    if not metric:
+        require_choice("objective of the topological form", objective, OBJECTIVES)
+    engine = "incremental" if find_spec("numba") else "scratch"
+    planner = Planner(graph, objective=objective, signature=default_signature(objective), engine=engine)
     model = learn_closures(graph, world=world) if closures is None else closures
     of_odometry, of_closures = (
         (default_information(graph), closure_information(graph)) if information is None else (np.asarray(information),) * 2
@@ -160,7 +170,12 @@ def search_roadmap(
             graph, paths, closures=model, information=information, spacing=spacing, turn=turn, world=world, start=begin
         )
 
-    evaluations = Evaluations(planner, predict, walks.roadmap.vertices, cost_per_metre)
+    def measure(actions: list[Action]) -> FloatArray:
+        if metric:
+            return planner.entropies(actions)
+        return constant(objective, graph) - planner.decide(actions, proof="none").signatures
+
+    evaluations = Evaluations(planner, predict, walks.roadmap.vertices, cost_per_metre, measure=measure)
     to_poses: FloatArray = np.asarray(KDTree(graph.positions[:, :2]).query(walks.roadmap.vertices)[0])
     candidates = spread_vias(walks, to_poses < model.radius, _NUM_CANDIDATES)
     local = LocalSearch(walks, evaluations, candidates, rng=np.random.default_rng(seed))
@@ -181,13 +196,14 @@ def search_roadmap(
             cost_per_metre=cost_per_metre,
             return_to_start=return_to_start,
             pose=begin.pose,
+            metric=metric,
         )
         shortest = 0.0 if goal is None else float(walks.distances(walks.start)[walks.end or 0])
         return BothBounds(flows, windows), FrontBounds(flows, shortest, walks.max_length)
 
     stays = walks.in_reach.sum() == 1  # there is one walk, to stay
     stay = Action(np.zeros((0, graph.poses.shape[1])), np.zeros((0, 2), np.int64), of_odometry)
-    value_now = float(planner.entropies([stay])[0])
+    value_now = float(measure([stay])[0])
 
     def told(progress: SearchProgress) -> None:
         if on_progress is not None:
@@ -238,6 +254,7 @@ def search_roadmap(
             stopped_by="proof" if stays else stopped_by,
             objective=objective,
             cost_per_metre=cost_per_metre,
+            metric=metric,
         )
 
     stopped_by = search.run([walks.walk(()), *_walks_of(earlier, walks.roadmap)])

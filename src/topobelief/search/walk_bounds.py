@@ -17,6 +17,7 @@ from topobelief.search.flows import FlowBound
 from topobelief.search.layers import Layers, build_layers, num_spots
 from topobelief.search.reduced_prior import ReducedPrior
 from topobelief.search.rewards import Rewards, odometry_powers
+from topobelief.search.topological_prior import OBJECTIVES, SeenPrior, TopologicalPrior, WeightForm
 from topobelief.search.ways import Ways, cells_of_pieces, find_sightings, first_pieces
 from topobelief.search.window_bound import WindowBound
 from topobelief.search.windows import Windows, find_odometry
@@ -52,10 +53,11 @@ def walk_bounds(
     pose: int | None = None,
     edge_costs: ArrayLike | None = None,
     pieces_per_pose: int | None = None,
+    metric: bool = True,
 ) -> tuple[FlowBound, WindowBound | None]:
     """The bounds over the walks from one vertex of a roadmap: by flows, and by windows where there are such.
 
-    Windows are for entropies and at most one closure a pose.
+    Windows are for entropies and at most one closure a pose, and need the information matrix (`metric`).
 
     It covers every walk that `predict_actions` makes an action of with these closures, this spacing and information, and no
     turn, and counts the closures with poses of the map. Closures among the walk's own new poses are not counted.
@@ -89,6 +91,8 @@ def walk_bounds(
         What driving each edge costs beyond its length, in the unit of the objective: time, energy, risk.
     pieces_per_pose
         Into how many layers the spacing is cut. Default: as many as are affordable, from 4 to 40.
+    metric
+        False: of the objective as its signature estimates it (`topological_prior`); not for "per_pose".
 
     Raises
     ------
@@ -97,7 +101,7 @@ def walk_bounds(
     PlanningError
         Where no walk within the length reaches the goal.
     """
-    require_choice("objective", objective, _OBJECTIVES)
+    require_choice("objective", objective, _OBJECTIVES if metric else OBJECTIVES)
     omega = np.asarray(information, dtype=np.float64)
     of_closures = omega if closure_information is None else np.asarray(closure_information, dtype=np.float64)
     pose = graph.num_poses - 1 if pose is None else pose
@@ -158,17 +162,19 @@ def walk_bounds(
     num_new = max(1, int(layers.records.number.max(initial=1)))
     sightings = find_sightings(graph, ways, pose, delta, closures, world, num_new)
     seen = sightings.seen if len(sightings.seen) else np.array([pose])
-    prior = ReducedPrior(
-        graph,
-        pose,
-        seen,
-        of_closures,
-        probability=closures.probability,
-        min_index_gap=closures.min_index_gap,
-        with_errors=objective == "error",
-    )
+    options = {
+        "probability": closures.probability,
+        "min_index_gap": closures.min_index_gap,
+        "with_errors": objective == "error",
+    }
     poses = ways.poses(graph, pose)
-    powers = odometry_powers(graph.group, poses, graph.positions[pose], omega)
+    if metric:
+        prior: SeenPrior = ReducedPrior(graph, pose, seen, of_closures, **options)
+        powers = odometry_powers(graph.group, poses, graph.positions[pose], omega)
+    else:
+        form = WeightForm.of(objective, graph, omega, of_closures)
+        prior = TopologicalPrior.of(graph, pose, seen, of_closures, form, **options)
+        powers = form.odometry_powers(omega, len(ways.source))
     idle = powers[0, 0] * float(counts_idle)
     fewest = max(0, math.ceil((whole - max_length + to_go[start]) / spacing - 1e-6))
     criterion = Criterion.of(objective, prior, idle, num_new, fewest)
@@ -184,7 +190,7 @@ def walk_bounds(
     flows = FlowBound(
         prior, criterion, rewards, rewards.background(), vertices, max_length, whole - max_length, covers.format("flows"), every
     )
-    if objective == "error" or most != 1 or len(seen) > _MOST_IN_WINDOWS:
+    if not isinstance(prior, ReducedPrior) or objective == "error" or most != 1 or len(seen) > _MOST_IN_WINDOWS:
         return flows, None
     odometry = find_odometry(graph.group, ways, poses, graph.positions[pose], omega, sightings.first, delta, spacing)
 

@@ -1,5 +1,7 @@
 """Active SLAM in closed loop: at each goal the planner gets the graph and the map, decides, and the robot drives.
 
+After the goals it may drive trips that improve the map (`exploration`), each decided as a way to a goal is.
+
 Everything on the way from the sensors to the wheels reads wheel odometry, scans and a bumper alone; the true pose goes into the
 record and nowhere else. A leg ends when the robot believes itself at its goal, and counts as reached where it truly is there.
 """
@@ -7,21 +9,22 @@ record and nowhere else. A leg ends when the robot believes itself at its goal, 
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from topobelief.arrays import FloatArray
-from topobelief.candidates.learned_closures import learn_closures
 from topobelief.candidates.polyline import path_length
+from topobelief.candidates.propose import CandidateRule
 from topobelief.errors import PlanningError
 from topobelief.geometry import SE2_GROUP
-from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.compile_kernels import load_kernels
-from topobelief.planning.planner import Planner
+from topobelief.search.anytime import SearchProgress
+from topobelief.search.result import SearchResult
+from topobelief.simulation.decisions import decision_rule, deliberated, deliberated_trip, value_after
+from topobelief.simulation.exploration import DRIVING, Exploration, TripOptions, find_trip
 from topobelief.simulation.path_following import PathFollower
 from topobelief.simulation.record import (
     ARRIVAL_TOLERANCE,
@@ -40,9 +43,7 @@ from topobelief.simulation.robot import Robot
 from topobelief.simulation.scan import Scan
 from topobelief.simulation.scenario import Goal, Scenario
 from topobelief.simulation.slam import Slam
-from topobelief.simulation.ways import known_candidates, place_with_room, stands_in_the_way
-from topobelief.strategies.choose import choose
-from topobelief.strategies.question import Ground, Question
+from topobelief.simulation.ways import place_with_room, stands_in_the_way
 from topobelief.world import World
 
 _BLOCKED = "blocked: by something unknown before, seen from"
@@ -92,6 +93,7 @@ class Episode:
         self._motions: list[FloatArray] = []
         self._track: list[FloatArray] = []
         self._wheel_at_start, self._time_at_start = start, 0.0
+        self._exploration: Exploration | None = None
         if history is not None:
             self._replay(history)
             start = SE2_GROUP.compose(self._truth[-1], np.array(displaced))
@@ -133,7 +135,7 @@ class Episode:
         on_leg: Callable[[Record], None] = lambda record: None,
         last_goal: int | None = None,
     ) -> Record:
-        """Drive to the goals that are left.
+        """Drive to the goals that are left, and then the trips that the options ask for.
 
         Parameters
         ----------
@@ -143,7 +145,7 @@ class Episode:
         on_leg
             Called with the record after each leg.
         last_goal
-            Stop after this goal, counted from 1.
+            Stop after this goal, counted from 1, and drive no trips.
         """
         goals = list(enumerate(self._scenario.goals, start=1))[:last_goal]
         self._should_stop, self._on_progress = should_stop, on_progress
@@ -151,12 +153,16 @@ class Episode:
             return self.record()
         for number, goal in goals:
             if not self._believes_reached(number) and not self._attempt(number, goal, on_leg):
-                break
+                return self.record()
+        if self._options.trips is not None and last_goal is None:
+            self._explore(self._options.trips, on_leg)
         return self.record()
 
     def record(self) -> Record:
         """The run as far as it went."""
-        outcomes = {leg.goal: leg.outcome for leg in self._legs}  # of the last leg to each goal
+        outcomes = {(leg.goal, leg.trip > 0): leg.outcome for leg in self._legs}  # of the last leg to each goal, and trip
+        if self._exploration is not None and self._exploration.stopped_by == INTERRUPTED:
+            outcomes[0, True] = INTERRUPTED
         failed = [outcome for outcome in outcomes.values() if outcome != ARRIVED]
         key_poses = KeyPoses(
             times=np.array(self._times),
@@ -175,6 +181,7 @@ class Episode:
             occupancy=self._slam.occupancy(),
             deliberations=tuple(self._deliberations),
             outcome=failed[-1] if failed else ARRIVED if outcomes else INTERRUPTED,
+            exploration=self._exploration,
         )
 
     def _believes_reached(self, goal: int) -> bool:
@@ -193,6 +200,50 @@ class Episode:
             if stuck == _MAX_STUCK or not leg.outcome.startswith(("stuck", "blocked")):
                 return False
         return False
+
+    def _explore(self, trips: TripOptions, on_leg: Callable[[Record], None]) -> None:
+        """Trips until it is certain that none gains enough, or there is another reason to stop."""
+        stuck = 0
+        while True:
+            driven = max((leg.trip for leg in self._legs), default=0)
+            first = self._slam.num_poses - 1
+            leg = Leg(goal=0, trip=driven + 1, first_pose=first, last_pose=first, outcome="")
+            try:
+                found = self._searched(trips, leg)
+            except PlanningError as error:
+                self._exploration = Exploration(stopped_by=f"unreachable: {error}", num_trips=driven)
+                return
+            self._exploration = Exploration.of(found, trips, driven)
+            if self._exploration.stopped_by != DRIVING:
+                return
+            deliberation, leg = deliberated_trip(self._slam.belief, found, self._options.objective, leg, index=len(self._legs))
+            self._deliberations.append(deliberation)
+            leg = self._driven(found.path, leg)
+            self._legs.append(leg)
+            stuck += leg.outcome.startswith("stuck")
+            if stuck == _MAX_STUCK or not (leg.believed_arrived or leg.outcome.startswith(("stuck", "blocked"))):
+                self._exploration = replace(self._exploration, stopped_by=leg.outcome, num_trips=driven + 1)
+                on_leg(self.record())
+                return
+            on_leg(self.record())
+
+    def _searched(self, trips: TripOptions, leg: Leg) -> SearchResult:
+        def tell(progress: SearchProgress) -> None:
+            self._on_progress(f"{leg.name}: searching", 0.0, 0.0)
+            if self._should_stop():
+                raise KeyboardInterrupt  # the search ends with what it has
+
+        known, belief = self._known_world(), self._slam.belief
+        return find_trip(
+            belief,
+            known,
+            self._rule(belief, known),
+            trips,
+            self._options.objective,
+            chassis=self._scenario.robot.radius,
+            position_error=self._slam.position_error,
+            on_progress=tell,
+        )
 
     def _approach(self) -> Leg:
         path = np.array([self._slam.poses[-1, :2], *self._scenario.approach])
@@ -214,50 +265,22 @@ class Episode:
 
     def _deliberated(self, goal: Goal, leg: Leg) -> tuple[Deliberation, Leg]:
         """Candidates, the choice among them, and what all of them would have been worth."""
-        begin, options, belief = time.perf_counter(), self._options, self._slam.belief
-        settings = self._slam.settings
-        known, rule = self._known_world(), self._scenario.rule
-        closures = rule.closures
-        if closures is None:
-            seen_in = known if rule.line_of_sight else None
-            closures = learn_closures(belief, world=seen_in, rule=settings.expected_closures)
-        rule = replace(
-            rule,
-            closures=closures,
-            seed=options.seed,
-            spacing=settings.key_pose_distance,
-            turn=settings.key_pose_angle,
-            information=settings.expected_information if belief.num_edges == 0 else None,
-        )
-        found = known_candidates(
+        known, belief = self._known_world(), self._slam.belief
+        return deliberated(
             belief,
             known,
             goal,
-            rule,
+            self._rule(belief, known),
+            self._options,
+            leg,
+            index=len(self._legs),
             chassis=self._scenario.robot.radius,
             position_error=self._slam.position_error,
+            rng=self._rng(_CHOICE, len(self._legs)),
         )
-        actions, lengths = found.actions, found.lengths
-        candidates_seconds = time.perf_counter() - begin
-        drawn = int(self._rng(_CHOICE, len(self._legs)).integers(len(actions)))
-        random_scores = np.eye(len(actions))[drawn]
-        ground = Ground(found.routes.roadmap, goal.place, known, rule)
-        question = Question(belief, actions, lengths, random_scores, options.objective, ground=ground)
-        choice = choose(options.strategy, question)
-        own = choice.proposal
-        question = question.joined_by(own)
-        values, paths = question.values(), found.paths if own is None else [*found.paths, own.path]
-        deliberation = Deliberation(leg=len(self._legs), question=question, paths=paths, values=values, choice=choice)
-        return deliberation, replace(
-            leg,
-            num_candidates=len(paths),
-            chosen=choice.index,
-            planned=float(question.lengths[choice.index]),
-            prior_value=value_after(belief, belief.num_poses, options.objective),
-            predicted_value=float(values[choice.index]),
-            candidates_seconds=candidates_seconds,
-            decision_seconds=choice.seconds,
-        )
+
+    def _rule(self, belief: PoseGraph, known: World) -> CandidateRule:
+        return decision_rule(self._scenario.rule, belief, known, self._slam.settings, seed=self._options.seed)
 
     def _known_world(self) -> World:
         return self._slam.occupancy().to_world(unknown="optimistic") if self._options.unknown else self._scenario.world
@@ -265,7 +288,7 @@ class Episode:
     def _driven(self, path: FloatArray, leg: Leg) -> Leg:
         """The leg once its path was followed, to the end or not."""
         begin, contacts, closures = self._robot.time, self._robot.contacts, self._slam.num_closures
-        outcome, distance = self._follow(path, f"goal {leg.goal}" if leg.goal else "approach")
+        outcome, distance = self._follow(path, leg.name)
         true, believed = (
             math.dist(pose[:2].tolist(), path[-1].tolist())
             for pose in (self._robot.true_pose, self._slam.pose_now(self._wheel_now()))
@@ -283,7 +306,7 @@ class Episode:
             last_pose=self._slam.num_poses - 1,
             distance=distance,
             num_closures=self._slam.num_closures - closures,
-            achieved_value=value_after(self._slam.belief, leg.first_pose + 1, objective) if leg.goal else float("nan"),
+            achieved_value=value_after(self._slam.belief, leg.first_pose + 1, objective) if leg.is_decided else math.nan,
             driven_seconds=self._robot.time - begin,
             contacts=self._robot.contacts - contacts,
         )
@@ -354,11 +377,3 @@ class Episode:
 
 def _shown(pose: FloatArray) -> str:
     return f"({pose[0]:.2f}, {pose[1]:.2f})"
-
-
-def value_after(graph: PoseGraph, num_existing: int, objective: str) -> float:
-    """The objective of a graph whose first `num_existing` poses stood before the leg, in its unit."""
-    among = (graph.edges < num_existing).all(axis=1)
-    prior = PoseGraph(graph.poses[:num_existing], graph.edges[among], None, graph.information[among])
-    rest = Action(graph.poses[num_existing:], graph.edges[~among], graph.information[~among])
-    return float(Planner(prior, objective=objective).entropies([rest])[0])

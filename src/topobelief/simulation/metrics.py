@@ -125,8 +125,8 @@ def run_metrics(record: Record) -> dict[str, float]:
     `goal_distance` and `believed_goal_distance` are the largest over the last legs to each goal, see `record.Leg`.
     """
     legs = record.legs
-    decided = [leg for leg in legs if leg.goal > 0]
-    last = {leg.goal: leg for leg in decided}.values()  # the last leg to each goal
+    decided = [leg for leg in legs if leg.is_decided]
+    last = {leg.goal: leg for leg in decided if leg.goal}.values()  # the last leg to each goal
     before = decided[-1].first_pose + 1 if decided else len(record.truth)
     values: dict[str, float] = {
         "goals": len(record.scenario.goals),

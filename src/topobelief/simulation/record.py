@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from topobelief.arrays import FloatArray
 from topobelief.graph.pose_graph import PoseGraph
+from topobelief.simulation.exploration import Exploration, TripOptions
 from topobelief.simulation.noise import InjectedNoise
 from topobelief.simulation.occupancy import OccupancyMap
 from topobelief.simulation.scan import Scan
@@ -34,6 +35,8 @@ class RunOptions:
         None: physical noise alone.
     unknown
         Start with an empty map instead of the floor plan.
+    trips
+        Which trips to drive after the goals to improve the map; None: none.
     """
 
     strategy: str = "resistance"
@@ -41,6 +44,7 @@ class RunOptions:
     seed: int = 0
     noise: InjectedNoise | None = None
     unknown: bool = False
+    trips: TripOptions | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,7 +54,7 @@ class Leg:
     Attributes
     ----------
     goal
-        Counts from 1; 0 for the approach, on which nothing is decided.
+        Counts from 1; 0 for the approach, on which nothing is decided, and for trips.
     first_pose, last_pose
         Key poses at its begin and end.
     outcome
@@ -73,7 +77,9 @@ class Leg:
         Physics steps (of 5 ms) in which the chassis touched a wall.
     goal_distance, believed_goal_distance
         From the goal at the end of the leg, of the robot's true position and of where it believed itself to be, metres; nan
-        where nothing was driven.
+        where nothing was driven. Of a trip: from its end.
+    trip
+        Counts from 1; 0 for a leg to a goal and for the approach.
     """
 
     goal: int
@@ -94,6 +100,17 @@ class Leg:
     contacts: int = 0
     goal_distance: float = float("nan")
     believed_goal_distance: float = float("nan")
+    trip: int = 0
+
+    @property
+    def name(self) -> str:
+        """What to call it."""
+        return f"trip {self.trip}" if self.trip else f"goal {self.goal}" if self.goal else "approach"
+
+    @property
+    def is_decided(self) -> bool:
+        """Whether its path was chosen, as that of every leg but the approach is."""
+        return self.goal > 0 or self.trip > 0
 
     @property
     def arrived(self) -> bool:
@@ -192,6 +209,8 @@ class Record:
         Of this run.
     outcome
         "arrived" where all goals that it set out for were reached, else what the last leg to the last of the others says.
+    exploration
+        How trips to improve the map ended; None where there were none, or not yet.
     """
 
     scenario: Scenario
@@ -203,6 +222,7 @@ class Record:
     occupancy: OccupancyMap
     deliberations: tuple[Deliberation, ...]
     outcome: str
+    exploration: Exploration | None = None
 
     @property
     def truth(self) -> FloatArray:

@@ -31,6 +31,7 @@ from topobelief.io.files import StrPath, read_text
 from topobelief.io.g2o import write_g2o
 from topobelief.io.json_values import without_nan
 from topobelief.planning.registry import unit_of
+from topobelief.simulation.exploration import Exploration
 from topobelief.simulation.metrics import chained, run_metrics
 from topobelief.simulation.noise import InjectedNoise
 from topobelief.simulation.record import Deliberation, History, KeyPoses, Leg, Record, RunOptions
@@ -75,6 +76,7 @@ def run_document(record: Record) -> dict[str, object]:
         "outcome": record.outcome,
         "metrics": {name: without_nan(value) for name, value in run_metrics(record).items()},
         "legs": [{name: without_nan(value) for name, value in asdict(leg).items()} for leg in record.legs],
+        "exploration": None if record.exploration is None else _exploration(record.exploration),
     }
 
 
@@ -182,6 +184,11 @@ def _deliberation(each: Deliberation) -> dict[str, object]:
             for path, length, action, value in candidates
         ],
     }
+
+
+def _exploration(found: Exploration) -> dict[str, object]:
+    """How trips ended; None stands for what is not known."""
+    return without_nan({**asdict(found), "gain": found.gain, "most": found.most})
 
 
 def _json(document: Mapping[str, object]) -> str:

@@ -50,7 +50,7 @@ def known_candidates(
         Where there is no way.
     """
     least = chassis + position_error
-    wanted = max(rule.robot_radius, least + _STRAY)
+    wanted = room_wanted(rule, chassis=chassis, position_error=position_error)
     radius = max(least, min(wanted, _TIGHT * float(world.clearance([goal.place])[0])))
     start = place_with_room(world, belief.positions[-1], radius)
     try:
@@ -59,6 +59,11 @@ def known_candidates(
         raise PlanningError(
             f"{error}; paths keep room for the chassis of {chassis:g} m and a position error of {position_error:.2f} m"
         ) from None
+
+
+def room_wanted(rule: CandidateRule, *, chassis: float, position_error: float) -> float:
+    """How far paths keep from walls where there is room, metres: for a robot that leaves its path and errs in its position."""
+    return max(rule.robot_radius, chassis + position_error + _STRAY)
 
 
 def place_with_room(world: World, here: FloatArray, radius: float) -> FloatArray:
