@@ -158,7 +158,7 @@ def test_without_a_goal_the_value_is_at_least_as_good_as_with_any():
 
 def test_a_trip_that_returns_ends_where_it_began():
     graph, roadmap = scene(3)
-    result = search(graph, roadmap, max_length=6.0, return_to_start=True)
+    result = search(graph, roadmap, max_length=6.0, return_to_start=True, max_evaluations=300)
     np.testing.assert_array_equal(result.path[0], result.path[-1])
     assert len(result.path) > 1
     assert result.length <= 6.0
@@ -260,7 +260,7 @@ def test_a_goal_that_is_no_vertex_is_joined_to_the_roadmap():
     world = tb.World.from_boxes([], bounds=(-4, -4, 8, 8))
     graph = drive(np.random.default_rng(1), num_poses=4)
     roadmap = tb.build_roadmap(world, graph.poses[-1], (3, 3), num_vertices=30, robot_radius=0.2)
-    result = search(graph, roadmap, goal=(2.5, 1.25, 0.3), world=None)
+    result = search(graph, roadmap, goal=(2.5, 1.25, 0.3), world=None, max_evaluations=100)
     assert result.path[-1].tolist() == [2.5, 1.25]
 
 

@@ -11,7 +11,8 @@ The search keeps all walks that it has evaluated. The *leaders* are the best of 
 the best at shorter lengths, which have room for insertions. Neighbours of the first leader that has any left are evaluated, a
 batch at a time, most promising first: insertions whose via-vertex has gained most per metre so far. When all neighbours of all
 leaders are known, the search starts again from a leader some of whose via-vertices are replaced by random ones; and when that
-has led nowhere, it goes on with the neighbours of all other walks, best first.
+has led nowhere, it goes on with the neighbours of all other walks, best first, and last with *spurs*: there and back to a
+vertex nearby.
 """
 
 from __future__ import annotations
@@ -67,8 +68,8 @@ class LocalSearch:
         reachable = np.flatnonzero(walks.in_reach)
         self._reachable, self._near = reachable, KDTree(walks.roadmap.vertices[reachable])
         self._yield: dict[int, float] = {}  # most that inserting a via-vertex gained, per metre
-        self._left: dict[Walk, Iterator[list[_Change]]] = {}
-        self._exhausted: set[Walk] = set()
+        self._left: dict[tuple[Walk, bool], Iterator[list[_Change]]] = {}  # by walk, and whether they are spurs
+        self._exhausted: set[tuple[Walk, bool]] = set()
         self._tried: set[Vias] = set()  # as neighbours
         self._known = 0  # walks that were evaluated when the leaders were chosen
         self._leading: list[Walk] = []  # the best that differ from each other;
@@ -90,22 +91,24 @@ class LocalSearch:
         return self._evaluate_neighbours(self._leaders(), size)
 
     def widen(self, size: int) -> int:
-        """Evaluate about `size` neighbours of any walk, best first; 0 when all neighbours of all walks are known."""
+        """Evaluate about `size` neighbours or spurs of any walk, best first; 0 when those of all walks are known."""
         walks, _, values = self._evaluations.arrays()
-        best_first: list[int] = np.argsort(values, kind="stable").tolist()
-        return self._evaluate_neighbours((walks[index] for index in best_first), size)
+        order: list[int] = np.argsort(values, kind="stable").tolist()
+        best_first = [walks[index] for index in order]
+        return self._evaluate_neighbours(best_first, size) or self._evaluate_neighbours(best_first, size, spurs=True)
 
-    def _evaluate_neighbours(self, walks: Iterable[Walk], size: int) -> int:
-        """Of the first of the walks that has any left."""
+    def _evaluate_neighbours(self, walks: Iterable[Walk], size: int, *, spurs: bool = False) -> int:
+        """Of the first of the walks that has any left: spurs, or all others."""
         before = len(self._evaluations)
         for walk in walks:
-            while walk not in self._exhausted:
-                if walk not in self._left:
-                    self._left[walk] = self._batches(walk, size)
-                batch = next(self._left[walk], None)
+            key = walk, spurs
+            while key not in self._exhausted:
+                if key not in self._left:
+                    self._left[key] = _batches(self._spurs(walk) if spurs else self._changes(walk), size)
+                batch = next(self._left[key], None)
                 if batch is None:
-                    self._exhausted.add(walk)
-                    del self._left[walk]
+                    self._exhausted.add(key)
+                    del self._left[key]
                     break
                 self._try(walk, batch)
                 if len(self._evaluations) > before:
@@ -123,7 +126,7 @@ class LocalSearch:
         improved = True
         while improved:
             improved = False
-            for batch in itertools.islice(self._batches(walk, size), _BATCHES_PER_CLIMB):
+            for batch in itertools.islice(_batches(self._changes(walk), size), _BATCHES_PER_CLIMB):
                 walks = [change.walk or self._walks.walk(change.vias) for change in batch]
                 self._evaluations.evaluate(walks)
                 best = min(walks, key=self._evaluations.value, default=walk)
@@ -170,7 +173,7 @@ class LocalSearch:
             self._known = len(walks)
         return list(dict.fromkeys([*self._leading, *self._shorter]))
 
-    def _batches(self, walk: Walk, size: int) -> Iterator[list[_Change]]:
+    def _changes(self, walk: Walk) -> Iterator[_Change]:
         """Neighbours of a walk that were not tried as another one's, most promising first."""
         vias = self._walks.vias(walk)
         changes = itertools.chain(
@@ -181,10 +184,12 @@ class LocalSearch:
             self._exchanges(vias),
             self._recombinations(walk),
         )
-        new = (change for change in changes if change.walk is not None or change.vias not in self._tried)
-        while batch := list(itertools.islice(new, size)):
-            self._tried.update(change.vias for change in batch if change.walk is None)
-            yield batch
+        for change in changes:
+            if change.walk is not None:
+                yield change
+            elif change.vias not in self._tried:
+                self._tried.add(change.vias)
+                yield change
 
     def _insertions(self, vias: Vias, places: Iterable[int] | None = None) -> list[_Change]:
         """One more via-vertex where that is within the length; those first that have gained most per metre so far.
@@ -255,9 +260,24 @@ class LocalSearch:
                     if length <= self._walks.limit:
                         yield _Change((), walk=new)
 
+    def _spurs(self, walk: Walk) -> Iterator[_Change]:
+        """There and back to a vertex nearby, from each vertex of a walk."""
+        length = float(self._walks.lengths_along(walk)[-1])
+        for index, vertex in enumerate(walk):
+            distances = self._walks.distances(vertex)
+            for other in self._neighbours(vertex):
+                if length + 2 * distances[other] <= self._walks.limit:
+                    spur = *self._walks.way(vertex, other), *self._walks.way(other, vertex)
+                    yield _Change((), walk=(*walk[: index + 1], *spur, *walk[index + 1 :]))
+
     def _within(self, vias: Vias) -> Iterator[_Change]:
         if vias not in self._tried and self._walks.length(vias) <= self._walks.limit:
             yield _Change(vias)
+
+
+def _batches(changes: Iterator[_Change], size: int) -> Iterator[list[_Change]]:
+    while batch := list(itertools.islice(changes, size)):
+        yield batch
 
 
 def spread_vias(walks: Walks, useful: BoolArray, count: int) -> IntArray:
