@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import topobelief as tb
-from roadmap_walks import Case, random_case
+from roadmap_walks import Case, random_case, with_landmarks
 from topobelief.search.flow_bound import flow_bound
 from topobelief.search.flows import FlowBound
 
@@ -43,6 +43,31 @@ def test_no_walk_is_better_than_the_bound(seed, objective):
     values = case.values(objective, walks)
     _, found = _run(case, objective, float(values.min()), 5)
     assert set(found) <= {tuple(walk.tolist()) for walk in walks}
+
+
+@pytest.mark.parametrize("objective", OBJECTIVES)
+@pytest.mark.parametrize("seed", WITH_WALKS)
+def test_no_walk_is_better_than_the_bound_where_landmarks_are_seen(seed, objective):
+    """Any sensor: range, field of view, limit a pose, probability, with walls and loop closures beside."""
+    case = with_landmarks(random_case(seed), seed)
+    walks = case.walks()
+    values = case.values(objective, walks)
+    without = replace(case, observations=tb.ObservationModel(1e-6, 1.0)).values(objective, walks)
+    assert (values <= without + 1e-9).all()
+    _run(case, objective, float(values.min()), 5)
+
+
+@pytest.mark.parametrize("objective", ["error", "map"])
+def test_landmarks_alone_are_something_to_see(objective):
+    """Without any loop closure the flow's bound follows what landmarks bring, and meets the best walk in the end."""
+    case = with_landmarks(random_case(17), 3)
+    case = replace(case, rule=tb.ClosureModel(radius=1e-6), observations=tb.ObservationModel(4.0, 0.05, probability=1.0))
+    values = case.values(objective, case.walks())
+    bound, _ = _run(case, objective, float(values.min()), 30)
+    now = tb.Planner(case.graph, objective="map").entropies([tb.Action([], [], case.information)])[0]
+    assert values.min() < values.max()
+    assert bound.lower_bound >= values.min() - 0.3 * np.ptp(values)
+    assert objective == "error" or values.min() < now
 
 
 @pytest.mark.parametrize("objective", ["error", "map", "joint"])

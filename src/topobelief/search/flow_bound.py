@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from topobelief.candidates.closures import ClosureModel
+from topobelief.candidates.observations import ObservationModel
 from topobelief.candidates.roadmap import Roadmap
 from topobelief.errors import InvalidInputError, PlanningError, require_choice
 from topobelief.graph.pose_graph import PoseGraph
@@ -17,7 +18,7 @@ from topobelief.search.flows import FlowBound
 from topobelief.search.layers import build_layers
 from topobelief.search.reduced_prior import reduced_prior
 from topobelief.search.rewards import Rewards, odometry_powers
-from topobelief.search.ways import Ways, cells_of_pieces, find_sightings, first_pieces
+from topobelief.search.ways import Ways, cells_of_pieces, find_landmarks, find_sightings, first_pieces
 from topobelief.world import World
 
 _OBJECTIVES = ("error", "map", "joint", "per_pose")
@@ -39,6 +40,7 @@ def flow_bound(
     max_length: float,
     objective: str,
     closures: ClosureModel,
+    observations: ObservationModel | None = None,
     spacing: float,
     information: ArrayLike,
     closure_information: ArrayLike | None = None,
@@ -66,6 +68,8 @@ def flow_bound(
     objective
         "error" (metres), "map", "joint" (nats) or "per_pose" (nats a pose).
     closures
+    observations
+        Which landmarks of the map new poses observe, and how well. Default: none.
     spacing
         Metres from new pose to new pose.
     information : shape (kappa, kappa)
@@ -94,7 +98,7 @@ def flow_bound(
     require_choice("objective", objective, _OBJECTIVES)
     omega = np.asarray(information, dtype=np.float64)
     of_closures = omega if closure_information is None else np.asarray(closure_information, dtype=np.float64)
-    pose = graph.num_poses - 1 if pose is None else pose
+    pose = graph.last_pose if pose is None else pose
     if not (math.isfinite(max_length) and max_length >= 0):
         raise InvalidInputError(f"expected a length of at least 0 m, got {max_length}")
     if not (math.isfinite(cost_per_metre) and cost_per_metre >= 0):
@@ -150,8 +154,17 @@ def flow_bound(
     )
     layers = build_layers(ways, first_vertex, remaining, is_end, whole, delta, pieces_per_pose, cells)
     num_new = max(1, int(layers.records.number.max(initial=1)))
-    sightings = find_sightings(graph, ways, pose, delta, closures, world, num_new)
-    seen = sightings.seen if len(sightings.seen) else np.array([pose])
+    among = int(np.searchsorted(graph.pose_indices, pose))
+    sightings = find_sightings(graph.poses_alone, ways, among, delta, closures, world, num_new)
+    seen = graph.pose_indices[sightings.seen]
+    num_seen_poses, observed, most_landmarks = len(seen), None, 0
+    if observations is not None and graph.num_landmarks:
+        landmarks = find_landmarks(graph, ways, pose, delta, observations, world)
+        sightings, seen = sightings.with_more(landmarks), np.concatenate([seen, landmarks.seen])
+        observed = observations.information(graph.tangent_dim, graph.group.position_dim)
+        most_landmarks = observations.max_per_pose or 0
+    if not len(seen):
+        seen, num_seen_poses = np.array([pose]), 1
     prior = reduced_prior(
         graph,
         pose,
@@ -160,17 +173,34 @@ def flow_bound(
         probability=closures.probability,
         min_index_gap=closures.min_index_gap,
         with_errors=objective == "error",
+        observed=observed,
     )
     powers = odometry_powers(graph.group, ways.poses(graph, pose), graph.positions[pose], omega)
     idle = powers[0, 0] * float(counts_idle)
     fewest = max(0, math.ceil((whole - max_length + to_go[start]) / spacing - 1e-6))
     criterion = Criterion.of(objective, prior, idle, num_new, fewest)
     most = closures.max_per_pose or 0
-    rewards = Rewards(layers, ways, sightings, delta, powers, idle, prior.earliest, most, num_new, driven, prices, cells)
+    rewards = Rewards(
+        layers,
+        ways,
+        sightings,
+        delta,
+        powers,
+        idle,
+        prior.earliest,
+        most,
+        num_new,
+        driven,
+        prices,
+        cells,
+        num_seen_poses,
+        most_landmarks,
+    )
+    counted = "loop closures with the poses of the map" + ("" if observed is None else " and observations of its landmarks")
     covers = (
         f"every walk of the roadmap of at most {max_length:.6g} m"
         + (" to the goal" if goal is not None else " that returns to its start" if return_to_start else "")
-        + ", counting loop closures with the poses of the map, not those among its own new poses; by flows in layers of "
+        + f", counting {counted}, not closures among its own new poses; by flows in layers of "
         f"{100 * delta:.3g} cm"
     )
     return FlowBound(prior, criterion, rewards, vertices, max_length, covers)

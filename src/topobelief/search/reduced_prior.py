@@ -3,7 +3,8 @@
 A world twist xi moves a pose x to exp(xi) x, about an origin at the pose where the robot is, which is held. In it a
 measurement i -> j with noise Omega sees Ad(x_j)^-1 (xi_j - xi_i): its information W_j = Ad(x_j)^-T Omega Ad(x_j)^-1 depends
 on the pose where it ends alone (docs, the mathematics, section 13). Closures are stored new -> old, so what one adds is
-known before any walk is.
+known before any walk is. An observation of a landmark whose noise has no direction adds A^T A / sigma^2, which depends on the
+place of the landmark alone.
 
 For the expected error of the map, K = Sigma_mS Pi Sigma_Sm / |S| too: Sigma_mS the covariance of the seen poses with the
 positions of a sample S of the poses, Pi what is left of them after the best rigid alignment (section 12).
@@ -33,13 +34,16 @@ class ReducedPrior:
     tangent_dim
         kappa.
     num_free
-        Poses of the prior that are not held.
+        Nodes of the prior that are not held.
+    dimension
+        Their numbers: kappa for a pose, k for a landmark.
     log_det
         ln det of the prior's information.
     sigma : shape (m kappa, m kappa)
-        Covariance of the seen poses in world twists; rows of the pose that is held are 0.
+        Covariance of what is seen, poses in world twists and landmarks as positions; rows of the pose that is held are 0, and
+        those of the rotations that landmarks have not.
     closures : shape (m, kappa, kappa)
-        W of a closure with each of them, its probability included.
+        W of a closure with each of them, or of an observation; its probability included.
     earliest : shape (m,)
         The first new pose that is far enough away along the way to close a loop with it.
     kernel : shape (m kappa, m kappa), or None
@@ -50,6 +54,7 @@ class ReducedPrior:
 
     tangent_dim: int
     num_free: int
+    dimension: int
     log_det: float
     sigma: FloatArray
     closures: FloatArray
@@ -67,6 +72,7 @@ def reduced_prior(
     probability: float,
     min_index_gap: int,
     with_errors: bool,
+    observed: FloatArray | None = None,
 ) -> ReducedPrior:
     """The prior on some poses.
 
@@ -77,7 +83,7 @@ def reduced_prior(
     pose
         Which is held.
     seen : shape (m,)
-        Poses, ascending.
+        Poses, ascending, then landmarks.
     information : shape (kappa, kappa)
         Of a closure.
     probability
@@ -85,6 +91,8 @@ def reduced_prior(
     min_index_gap
     with_errors
         Whether the expected error of the map is asked for.
+    observed : shape (kappa, kappa), optional
+        Expected information of an observation, the same along every direction; needed where landmarks are seen.
     """
     factor = PriorFactors(graph, pose).factor("joint", 0.0)
     if not np.isfinite(factor.log_det.error):
@@ -94,7 +102,9 @@ def reduced_prior(
     wanted = np.union1d(seen, sample)
     rows = _inverse_root(factor, wanted)  # covariance of the wanted poses is rows rows^T, in (dp, dphi)
     group, kappa, k = graph.group, graph.tangent_dim, graph.group.position_dim
-    seen_rows = to_twists(group, graph.positions[seen] - graph.positions[pose]) @ rows[np.searchsorted(wanted, seen)]
+    of_seen, is_landmark = rows[np.searchsorted(wanted, seen)], graph.is_landmark[seen]
+    of_seen[is_landmark, k:] = 0.0
+    seen_rows = to_twists(group, graph.positions[seen] - graph.positions[pose]) @ of_seen
     flat = seen_rows.reshape(len(seen) * kappa, -1)
     kernel, mean_square = None, np.nan
     if with_errors:
@@ -104,13 +114,21 @@ def reduced_prior(
         mixed = flat @ aligned.T
         kernel = mixed @ mixed.T / len(sample)
     adjoint = world_to_body(group, graph.poses[seen], graph.positions[pose])
+    closures = probability * adjoint.transpose(0, 2, 1) @ information @ adjoint
+    if observed is not None and is_landmark.any():
+        moved = _twists_to_moves(group, graph.positions[seen[is_landmark]] - graph.positions[pose])
+        closures[is_landmark] = moved.transpose(0, 2, 1) @ observed[:k, :k] @ moved
+    rank = np.cumsum(~graph.is_landmark)  # steps of odometry are counted over poses
+    apart = rank[pose] - rank[seen]
+    later = is_landmark | (seen > pose)
     return ReducedPrior(
         kappa,
-        graph.num_poses - 1,
+        graph.num_nodes - 1,
+        kappa * (graph.num_nodes - 1) - group.rotation_dim * graph.num_landmarks,
         factor.log_det.value,
         flat @ flat.T,
-        probability * adjoint.transpose(0, 2, 1) @ information @ adjoint,
-        np.where(seen > pose, 1, np.maximum(min_index_gap - (pose - seen), 1)),
+        closures,
+        np.where(later, 1, np.maximum(min_index_gap - apart, 1)),
         kernel,
         mean_square,
     )
@@ -125,6 +143,18 @@ def to_twists(group: Group, offsets: FloatArray) -> FloatArray:
     result = np.broadcast_to(np.eye(kappa), (len(offsets), kappa, kappa)).copy()
     result[:, :k, k:] = group.lever(offsets)
     return result
+
+
+def _twists_to_moves(group: Group, offsets: FloatArray) -> FloatArray:
+    """A with dp = A xi for points at these offsets from the origin, shape (n, k, kappa): dp = v - C(p) phi.
+
+    An observation of a point from a pose of twist xi_t has the residual R^T A (xi - xi_t), xi = (dp, 0) the point's own.
+    """
+    k = group.position_dim
+    moves = np.zeros((len(offsets), k, group.tangent_dim))
+    moves[:, :, :k] = np.eye(k)
+    moves[:, :, k:] = -group.lever(offsets)
+    return moves
 
 
 def world_to_body(group: Group, poses: FloatArray, origin: FloatArray) -> FloatArray:

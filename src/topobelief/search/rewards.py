@@ -1,8 +1,8 @@
 """What the arcs of the layers are worth to a gain's slopes, and the plan that a path through them is.
 
-A new pose anywhere on a piece of a way is covered in two steps. It closes loops with poses that its piece sees: with all of
-them or, where at most k are allowed, with k of them; slopes are never negative, so the k largest are an upper bound. Its
-odometry
+A new pose anywhere on a piece of a way is covered in two steps. It closes loops with poses that its piece sees, and observes
+landmarks likewise: with all of them or, where at most k are allowed, with k of them; slopes are never negative, so the k
+largest are an upper bound. Its odometry
 
     V(u) = (A_0 + u N A_0)^T Omega (A_0 + u N A_0),   A_0 = Ad(x)^-1 at the beginning of the way, N = Ad(exp(-e_x)) - I,
 
@@ -60,6 +60,10 @@ class Rewards:
         The first new pose that may close a loop with each seen pose.
     most
         Closures of a new pose at most; 0: no limit.
+    num_poses
+        How many of the seen are poses, the first ones; the others are landmarks.
+    most_landmarks
+        Of which a new pose observes at most so many; 0: no limit.
     num_new
         T.
     driven : shape (E,)
@@ -82,6 +86,8 @@ class Rewards:
     driven: FloatArray
     prices: FloatArray
     cells: Int32Array
+    num_poses: int
+    most_landmarks: int
 
     def of_records(self, slopes: Slopes, used: Int32Array) -> FloatArray:
         """Worth of some records, in a table of all of them."""
@@ -90,7 +96,7 @@ class Rewards:
         _value_records(
             used, records.number, records.way, records.piece, records.before, self.cells, self.ways.lengths, self.delta,
             slopes.odometry, self.powers, slopes.closures, sightings.first, sightings.start, sightings.poses, self.earliest,
-            self.most, worth,
+            self.num_poses, self.most, self.most_landmarks, worth,
         )  # fmt: skip
         return worth
 
@@ -134,10 +140,10 @@ class Rewards:
             before, cell = int(layers.records.before[record]), int(self.cells[place])
             seen = sightings.poses[sightings.start[place] : sightings.start[place + 1]]
             seen = seen[self.earliest[seen] <= t]
-            if self.most and len(seen) > self.most:
-                slope = slopes.closures[(t - 1) * layers.num_labels + cell, seen]
-                seen = seen[np.argsort(-slope, kind="stable")[: self.most]]
-            closures[t - 1, seen] = 1.0
+            slope = slopes.closures[(t - 1) * layers.num_labels + cell]
+            for kind, most in ((seen[seen < self.num_poses], self.most), (seen[seen >= self.num_poses], self.most_landmarks)):
+                chosen = kind[np.argsort(-slope[kind], kind="stable")[:most]] if most and len(kind) > most else kind
+                closures[t - 1, chosen] = 1.0
             ends = np.array(self._odometry_at(e, piece))
             odometry[t - 1] = ends[np.argmax(np.tensordot(ends, slopes.odometry[t - 1, before, cell], 2))]
             cells[t - 1] = cell
@@ -241,11 +247,14 @@ def _value_records(
     start: IntArray,
     poses: IntArray,
     earliest: IntArray,
-    most: int,
+    num_poses: int,
+    most_poses: int,
+    most_landmarks: int,
     worth: FloatArray,
 ) -> None:
-    """Worth of the records used: closures, and odometry at the better end of the piece."""
-    largest = np.zeros(most + 1)
+    """Worth of the records used: closures and observations, and odometry at the better end of the piece."""
+    largest = np.zeros(max(most_poses, most_landmarks) + 1)
+    num_kinds = 2 if len(earliest) > num_poses else 1
     kappa = odometry.shape[3]
     for r in used:
         t, e = number[r] - 1, way[r]
@@ -264,21 +273,21 @@ def _value_records(
                 square += slope * powers[2, e, i, j]
         row = t * odometry.shape[1] + cell
         value = max(constant + begin * (linear + begin * square), constant + end * (linear + end * square))
-        if most == 0:
-            for q in range(start[p], start[p + 1]):
-                if earliest[poses[q]] <= number[r]:
-                    value += closures[row, poses[q]]
-        else:
+        for kind in range(num_kinds):
+            most = most_poses if kind == 0 else most_landmarks
             for c in range(most):
                 largest[c] = 0.0
             for q in range(start[p], start[p + 1]):
-                if earliest[poses[q]] <= number[r]:
-                    slope, c = closures[row, poses[q]], most - 1
-                    if slope > largest[c]:
-                        while c > 0 and largest[c - 1] < slope:
-                            largest[c] = largest[c - 1]
-                            c -= 1
-                        largest[c] = slope
+                if earliest[poses[q]] > number[r] or (poses[q] >= num_poses) != (kind == 1):
+                    continue
+                slope, c = closures[row, poses[q]], most - 1
+                if most == 0:
+                    value += slope
+                elif slope > largest[c]:
+                    while c > 0 and largest[c - 1] < slope:
+                        largest[c] = largest[c - 1]
+                        c -= 1
+                    largest[c] = slope
             for c in range(most):
                 value += largest[c]
         worth[r] = value
