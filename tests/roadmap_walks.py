@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from shapely import box
@@ -30,6 +30,7 @@ class Case:
     rule: tb.ClosureModel
     return_to_start: bool
     cost_per_metre: float
+    observations: tb.ObservationModel | None = None
 
     def arguments(self) -> dict:
         """Of `walk_bounds`, but for the objective."""
@@ -38,6 +39,7 @@ class Case:
             "goal": self.goal,
             "max_length": self.max_length,
             "closures": self.rule,
+            "observations": self.observations,
             "spacing": self.spacing,
             "information": self.information,
             "world": self.world,
@@ -65,7 +67,7 @@ class Case:
 
     def action(self, walk: IntArray) -> Action:
         """What the walk adds, without closures among its own new poses."""
-        n = self.graph.num_poses
+        n = self.graph.num_nodes
         (action,) = tb.predict_actions(
             self.graph,
             [self.roadmap.vertices[walk]],
@@ -73,6 +75,7 @@ class Case:
             spacing=self.spacing,
             turn=None,
             closures=self.rule,
+            observations=self.observations,
             world=self.world,
         )
         counted = (action.edges[:, 1] < n) | (np.arange(len(action.edges)) < action.num_new_poses)
@@ -95,8 +98,8 @@ class Case:
 def map_error(graph: tb.PoseGraph, action: Action) -> float:
     """Expected root mean square error of the positions that exist, after the best rigid alignment; dense, from scratch."""
     after = tb.posterior(graph, action)
-    form, kappa, n, k = fisher_rows(after).joint(), graph.tangent_dim, graph.num_poses, graph.group.position_dim
-    size = kappa * after.num_poses
+    form, kappa, n, k = fisher_rows(after).joint(), graph.tangent_dim, graph.num_nodes, graph.group.position_dim
+    size = kappa * after.num_nodes
     information = np.zeros((size, size))
     for (i, j), rows_i, rows_j in zip(form.edges, form.rows_i, form.rows_j, strict=True):
         row = np.zeros((len(rows_i), size))
@@ -191,3 +194,29 @@ def random_case(seed: int) -> Case:
     back = goal is None and seed % 3 == 0
     length *= 1.6 if back else 1.0
     return Case(graph, roadmap, world if see else None, goal, length, spacing, information, rule, back, cost)
+
+
+def with_landmarks(case: Case, seed: int) -> Case:
+    """The case with landmarks around the roadmap that its drive has seen, and a random sensor; nodes in any order of kinds."""
+    rng = np.random.default_rng(seed)
+    graph, n, count = case.graph, case.graph.num_poses, int(rng.integers(1, 6))
+    low, high = case.roadmap.vertices.min(axis=0) - 1, case.roadmap.vertices.max(axis=0) + 1
+    landmarks = np.column_stack([rng.uniform(low, high, (count, 2)), np.zeros(count)])
+    seen = np.array([(int(rng.integers(n)), n + landmark) for landmark in range(count) for _ in range(2)])
+    matrix = np.zeros((1, 3, 3))
+    matrix[0, [0, 1], [0, 1]] = rng.uniform(1, 30)
+    whole = tb.PoseGraph(
+        np.concatenate([graph.poses, landmarks]),
+        np.concatenate([graph.edges, seen]),
+        None,
+        np.concatenate([graph.information, np.repeat(matrix, len(seen), axis=0)]),
+        ["pose"] * n + ["landmark"] * count,
+    )
+    model = tb.ObservationModel(
+        max_range=float(rng.uniform(1, 5)),
+        sigma=float(rng.uniform(0.05, 0.5)),
+        field_of_view=float(rng.choice([2 * math.pi, rng.uniform(0.5, 6.0)])),
+        max_per_pose=[None, 1, 2][rng.integers(3)],
+        probability=float(rng.choice([1.0, 0.4])),
+    )
+    return replace(case, graph=whole, observations=model)

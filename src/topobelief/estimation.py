@@ -10,6 +10,9 @@ Most public files hold dead reckoning, far from the minimum. The search therefor
    descent and is halved until chi^2 falls; after each, positions are solved for again (variable projection, Golub and
    Pereyra 1973), so that a rotation is not held back by positions that would have to move with it.
 
+Landmarks take part as points: their observations have no rows of rotations, and where these read bearings and ranges the search
+starts from their positions and does without step 2. Ranges or bearings alone have no linear start: the given poses serve.
+
 All of it rests on one sparse L D L^T, which takes any information. GTSAM's optimiser, which the tests compare with, refuses
 some of these graphs: its planar initialisation (LAGO) wants diagonal noise, which csail and intel do not have, and its default
 elimination calls intel indeterminate because of one edge with information 2.7e12 and makes no step.
@@ -17,13 +20,14 @@ elimination calls intel indeterminate because of one edge with information 2.7e1
 
 from __future__ import annotations
 
+import warnings
 from contextlib import suppress
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from topobelief.arrays import FloatArray
-from topobelief.errors import EstimationError
+from topobelief.errors import EstimationError, NotOptimizedWarning
 from topobelief.geometry import Group
 from topobelief.graph.information import cholesky_roots, scalar_weights
 from topobelief.graph.observations import observations_by_kind, observed_residuals, roots_of_positions, seen_positions
@@ -36,6 +40,7 @@ _CONVERGED = 1e-10  # fall of chi^2 that the linear model still promises: 1e-5 s
 _ROUNDED, _ROUNDED_RELATIVE = 1e-6, 1e-12  # the same and a share of chi^2, where rounding lets it fall no more
 _SUFFICIENT = 1e-4  # share of the promised fall that a step must bring (Nocedal and Wright, section 3.1)
 _SHORTEST_STEP = 2.0**-20
+_PATIENCE, _FLAT = 50, 2e-3  # iterations, and share of chi^2: ranges alone may lead along a valley that is all but flat
 _SMALL_ANGLE = 1e-3  # below it the series of the Jacobian is exact in double precision
 
 
@@ -62,6 +67,11 @@ def optimize(graph: PoseGraph, *, max_iterations: int = 300) -> PoseGraph:
         Names poses that the first one does not reach.
     EstimationError
         If Gauss-Newton does not converge, or the graph is too ill-conditioned for it.
+
+    Warns
+    -----
+    NotOptimizedWarning
+        Where ranges or bearings leave a valley so flat that the search ends in it before it converges.
 
     Examples
     --------
@@ -150,6 +160,7 @@ class _Problem:
         poses = self._settled(poses)
         errors, residuals = self._residuals(poses)
         chi2 = _sum_of_squares(residuals)
+        before = [chi2]
         for _ in range(max_iterations):
             step, promised = _solved(self.pose_solver, *self._rows(poses, errors), residuals)
             length = 1.0
@@ -169,6 +180,15 @@ class _Problem:
                     )
             poses, errors, residuals, chi2 = trial, trial_errors, trial_residuals, trial_chi2
             if promised <= _CONVERGED:
+                return poses
+            before.append(chi2)
+            if not self.linear and len(before) > _PATIENCE and before[-_PATIENCE] - chi2 <= _FLAT * chi2:
+                warnings.warn(
+                    f"chi^2 = {chi2:.6g} fell by less than {100 * _FLAT:g} % in {_PATIENCE} iterations: ranges or bearings "
+                    "leave a flat valley, along which the estimate may still move",
+                    NotOptimizedWarning,
+                    stacklevel=3,
+                )
                 return poses
         raise EstimationError(
             f"expected Gauss-Newton to converge in {max_iterations} iterations, got chi^2 = {chi2:.6g} still falling; "

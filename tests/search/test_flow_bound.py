@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import topobelief as tb
-from roadmap_walks import Case, random_case
+from roadmap_walks import Case, random_case, with_landmarks
 from topobelief.search.flows import FlowBound
 from topobelief.search.front_bounds import FrontBounds
 from topobelief.search.walk_bounds import walk_bounds
@@ -46,6 +46,31 @@ def test_no_walk_is_better_than_the_bound(seed, objective):
     assert set(found) <= {tuple(walk.tolist()) for walk in walks}
 
 
+@pytest.mark.parametrize("objective", OBJECTIVES)
+@pytest.mark.parametrize("seed", WITH_WALKS)
+def test_no_walk_is_better_than_the_bound_where_landmarks_are_seen(seed, objective):
+    """Any sensor: range, field of view, limit a pose, probability, with walls and loop closures beside."""
+    case = with_landmarks(random_case(seed), seed)
+    walks = case.walks()
+    values = case.values(objective, walks)
+    without = replace(case, observations=tb.ObservationModel(1e-6, 1.0)).values(objective, walks)
+    assert (values <= without + 1e-9).all()
+    _run(case, objective, float(values.min()), 5)
+
+
+@pytest.mark.parametrize("objective", ["error", "map"])
+def test_landmarks_alone_are_something_to_see(objective):
+    """Without any loop closure the flow's bound follows what landmarks bring, and meets the best walk in the end."""
+    case = with_landmarks(random_case(17), 3)
+    case = replace(case, rule=tb.ClosureModel(radius=1e-6), observations=tb.ObservationModel(4.0, 0.05, probability=1.0))
+    values = case.values(objective, case.walks())
+    bound, _ = _run(case, objective, float(values.min()), 60)
+    now = tb.Planner(case.graph, objective="map").entropies([tb.Action([], [], case.information)])[0]
+    assert values.min() < values.max()
+    assert bound.lower_bound >= values.min() - 0.3 * np.ptp(values)
+    assert objective == "error" or values.min() < now
+
+
 @pytest.mark.parametrize("objective", ["error", "map", "joint"])
 @pytest.mark.parametrize(("seed", "detour"), [(1, 3.0), (4, 2.5), (9, 3.0), (23, 3.0), (31, 2.5)])
 def test_no_long_walk_is_better_than_the_bound(seed, detour, objective):
@@ -73,7 +98,7 @@ def test_the_bound_meets_the_best_value():
     walks = case.walks()
     for objective in ("error", "map"):
         values = case.values(objective, walks)
-        bound, _ = _run(case, objective, float(values.min()), 30)
+        bound, _ = _run(case, objective, float(values.min()), 60)
         assert bound.lower_bound >= values.min() - 0.05 * np.ptp(values)
         assert bound.share_ruled_out > 0.5
 

@@ -79,7 +79,7 @@ class Criterion:
         """
         kind, kappa = _KINDS[objective], prior.tangent_dim * prior.multiplicity
         each = kappa / 2 * math.log(2 * math.pi * math.e)
-        start = prior.mean_square if kind == "error" else prior.num_free * each - prior.log_det / 2
+        start = prior.mean_square if kind == "error" else prior.dimension * each / kappa - prior.log_det / 2
         is_joint, per_pose = kind == "joint", objective == "per_pose"
         size = kappa * (len(prior.closures) + (num_new if is_joint else 0))
         per_idle = prior.multiplicity * float(np.linalg.slogdet(idle)[1]) / 2 if is_joint else 0.0

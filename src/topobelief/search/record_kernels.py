@@ -51,11 +51,14 @@ def value_records(
     start: IntArray,
     poses: IntArray,
     earliest: IntArray,
-    most: int,
+    num_poses: int,
+    most_poses: int,
+    most_landmarks: int,
     worth: FloatArray,
 ) -> None:
-    """Worth of the records used: closures, and odometry at the better end of the piece."""
-    largest = np.zeros(most + 1)
+    """Worth of the records used: closures and observations, and odometry at the better end of the piece."""
+    largest = np.zeros(max(most_poses, most_landmarks) + 1)
+    num_kinds = 2 if len(earliest) > num_poses else 1
     kappa = odometry.shape[3]
     for r in used:
         t, e = number[r] - 1, way[r]
@@ -74,21 +77,21 @@ def value_records(
                 square += slope * powers[2, e, i, j]
         row = t * odometry.shape[1] + cell
         value = max(constant + begin * (linear + begin * square), constant + end * (linear + end * square))
-        if most == 0:
-            for q in range(start[p], start[p + 1]):
-                if earliest[poses[q]] <= number[r]:
-                    value += closures[row, poses[q]]
-        else:
+        for kind in range(num_kinds):
+            most = most_poses if kind == 0 else most_landmarks
             for c in range(most):
                 largest[c] = 0.0
             for q in range(start[p], start[p + 1]):
-                if earliest[poses[q]] <= number[r]:
-                    slope, c = closures[row, poses[q]], most - 1
-                    if slope > largest[c]:
-                        while c > 0 and largest[c - 1] < slope:
-                            largest[c] = largest[c - 1]
-                            c -= 1
-                        largest[c] = slope
+                if earliest[poses[q]] > number[r] or (poses[q] >= num_poses) != (kind == 1):
+                    continue
+                slope, c = closures[row, poses[q]], most - 1
+                if most == 0:
+                    value += slope
+                elif slope > largest[c]:
+                    while c > 0 and largest[c - 1] < slope:
+                        largest[c] = largest[c - 1]
+                        c -= 1
+                    largest[c] = slope
             for c in range(most):
                 value += largest[c]
         worth[r] = value

@@ -3,7 +3,8 @@
 A world twist xi moves a pose x to exp(xi) x, about an origin at the pose where the robot is, which is held. In it a
 measurement i -> j with noise Omega sees Ad(x_j)^-1 (xi_j - xi_i): its information W_j = Ad(x_j)^-T Omega Ad(x_j)^-1 depends
 on the pose where it ends alone (docs, the mathematics, section 13). Closures are stored new -> old, so what one adds is
-known before any walk is.
+known before any walk is. An observation of a landmark whose noise has no direction adds A^T A / sigma^2, which depends on the
+place of the landmark alone.
 
 For the expected error of the map, K = Sigma_mS Pi Sigma_Sm / |S| too: Sigma_mS the covariance of the seen poses with the
 positions of a sample S of the poses, Pi what is left of them after the best rigid alignment (section 12).
@@ -36,11 +37,13 @@ class ReducedPrior:
     tangent_dim
         kappa.
     num_free
-        Poses of the prior that are not held.
+        Nodes of the prior that are not held.
+    dimension
+        Their numbers: kappa for a pose, k for a landmark.
     log_det
         ln det of the prior's information.
     closures : shape (m, kappa, kappa)
-        W of a closure with each of them, its probability included.
+        W of a closure with each of them, or of an observation; its probability included.
     earliest : shape (m,)
         The first new pose that is far enough away along the way to close a loop with it.
     variances : shape (m, kappa, kappa)
@@ -65,6 +68,7 @@ class ReducedPrior:
         probability: float,
         min_index_gap: int,
         with_errors: bool,
+        observed: FloatArray | None = None,
     ) -> None:
         """The prior on some poses.
 
@@ -75,7 +79,7 @@ class ReducedPrior:
         pose
             Which is held.
         seen : shape (m,)
-            Poses, ascending.
+            Poses, ascending, then landmarks.
         information : shape (kappa, kappa)
             Of a closure.
         probability
@@ -83,18 +87,28 @@ class ReducedPrior:
         min_index_gap
         with_errors
             Whether the expected error of the map is asked for.
+        observed : shape (kappa, kappa), optional
+            Expected information of an observation, the same along every direction; needed where landmarks are seen.
         """
         group, kappa = graph.group, graph.tangent_dim
         form = form_of("joint", PriorFactors(graph, pose))
-        factor = FormFactor.of(EliminationTree.build(graph.edges, graph.num_poses, pose), form).or_with_strong_rows_last(form)
+        factor = FormFactor.of(EliminationTree.build(graph.edges, graph.num_nodes, pose), form).or_with_strong_rows_last(form)
         if not np.isfinite(factor.log_det.error):
             raise IllConditionedError("covariance of the map", factor.log_det.error)
         self._factor, self._seen = factor, seen
+        is_landmark = graph.is_landmark[seen]
         self._twists = to_twists(group, graph.positions[seen] - graph.positions[pose])
-        self.tangent_dim, self.num_free, self.log_det = kappa, graph.num_poses - 1, factor.log_det.value
+        self._twists[is_landmark, :, group.position_dim :] = 0.0  # it has no rotation
+        self.tangent_dim, self.num_free, self.log_det = kappa, graph.num_nodes - 1, factor.log_det.value
+        self.dimension = kappa * self.num_free - group.rotation_dim * graph.num_landmarks
         adjoint = world_to_body(group, graph.poses[seen], graph.positions[pose])
         self.closures = probability * adjoint.transpose(0, 2, 1) @ information @ adjoint
-        self.earliest = earliest_numbers(seen, pose, min_index_gap)
+        if observed is not None and is_landmark.any():
+            moves = _twists_to_moves(group, graph.positions[seen[is_landmark]] - graph.positions[pose])
+            k = group.position_dim
+            self.closures[is_landmark] = moves.transpose(0, 2, 1) @ observed[:k, :k] @ moves
+        rank = np.cumsum(~graph.is_landmark)  # steps of odometry are counted over poses
+        self.earliest = np.where(is_landmark, 1, earliest_numbers(rank[seen], int(rank[pose]), min_index_gap))
         self.variances = self._twists @ _variances(factor, seen) @ self._twists.transpose(0, 2, 1)
         self.mean_square, self._effects = np.nan, np.zeros((len(seen) * kappa, 0))
         if with_errors:
@@ -164,6 +178,18 @@ def to_twists(group: Group, offsets: FloatArray) -> FloatArray:
     result = np.broadcast_to(np.eye(kappa), (len(offsets), kappa, kappa)).copy()
     result[:, :k, k:] = group.lever(offsets)
     return result
+
+
+def _twists_to_moves(group: Group, offsets: FloatArray) -> FloatArray:
+    """A with dp = A xi for points at these offsets from the origin, shape (n, k, kappa): dp = v - C(p) phi.
+
+    An observation of a point from a pose of twist xi_t has the residual R^T A (xi - xi_t), xi = (dp, 0) the point's own.
+    """
+    k = group.position_dim
+    moves = np.zeros((len(offsets), k, group.tangent_dim))
+    moves[:, :, :k] = np.eye(k)
+    moves[:, :, k:] = -group.lever(offsets)
+    return moves
 
 
 def world_to_body(group: Group, poses: FloatArray, origin: FloatArray) -> FloatArray:

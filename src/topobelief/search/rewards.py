@@ -1,8 +1,8 @@
 """What the arcs of the layers are worth to a gain's slopes, and the plan that a path through them is.
 
-A new pose anywhere on a piece of a way is covered in two steps. It closes loops with poses that its piece sees: with all of
-them or, where at most k are allowed, with k of them; slopes are never negative, so the k largest are an upper bound. Its
-odometry
+A new pose anywhere on a piece of a way is covered in two steps. It closes loops with poses that its piece sees, and observes
+landmarks likewise: with all of them or, where at most k are allowed, with k of them; slopes are never negative, so the k
+largest are an upper bound. Its odometry
 
     V(u) = (A_0 + u N A_0)^T Omega (A_0 + u N A_0),   A_0 = Ad(x)^-1 at the beginning of the way, N = Ad(exp(-e_x)) - I,
 
@@ -63,6 +63,10 @@ class Rewards:
         The first new pose that may close a loop with each seen pose.
     most
         Closures of a new pose at most; 0: no limit.
+    num_poses
+        How many of the seen are poses, the first ones; the others are landmarks.
+    most_landmarks
+        Of which a new pose observes at most so many; 0: no limit.
     num_new
         T.
     driven : shape (E,)
@@ -85,6 +89,8 @@ class Rewards:
     driven: FloatArray
     prices: FloatArray
     cells: Int32Array
+    num_poses: int
+    most_landmarks: int
 
     def of_records(self, slopes: Slopes, used: Int32Array) -> FloatArray:
         """Worth of some records, in a table of all of them."""
@@ -93,7 +99,7 @@ class Rewards:
         value_records(
             used, records.number, records.way, records.piece, records.before, self.cells, self.ways.lengths, self.delta,
             slopes.odometry, self.powers, slopes.closures, sightings.first, sightings.start, sightings.poses, self.earliest,
-            self.most, worth,
+            self.num_poses, self.most, self.most_landmarks, worth,
         )  # fmt: skip
         return worth
 
@@ -136,10 +142,10 @@ class Rewards:
             before, cell = int(layers.records.before[record]), int(self.cells[place])
             seen = sightings.poses[sightings.start[place] : sightings.start[place + 1]]
             seen = seen[self.earliest[seen] <= t]
-            if self.most and len(seen) > self.most:
-                slope = slopes.closures[(t - 1) * layers.num_labels + cell, seen]
-                seen = seen[np.argsort(-slope, kind="stable")[: self.most]]
-            closures[t - 1, seen] = 1.0
+            slope = slopes.closures[(t - 1) * layers.num_labels + cell]
+            for kind, most in ((seen[seen < self.num_poses], self.most), (seen[seen >= self.num_poses], self.most_landmarks)):
+                chosen = kind[np.argsort(-slope[kind], kind="stable")[:most]] if most and len(kind) > most else kind
+                closures[t - 1, chosen] = 1.0
             ends = np.array(self._odometry_at(e, piece))
             odometry[t - 1] = ends[np.argmax(np.tensordot(ends, slopes.odometry[t - 1, before, cell], 2))]
             cells[t - 1] = cell

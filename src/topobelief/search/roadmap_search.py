@@ -20,6 +20,7 @@ from scipy.spatial import KDTree
 from topobelief.arrays import FloatArray
 from topobelief.candidates.closures import ClosureModel
 from topobelief.candidates.learned_closures import learn_closures
+from topobelief.candidates.observations import ObservationModel, learn_observations
 from topobelief.candidates.predicted_factors import closure_information, default_information, predict_actions
 from topobelief.candidates.roadmap import Roadmap
 from topobelief.candidates.start import Start, find_start
@@ -59,6 +60,7 @@ def search_roadmap(
     return_to_start: bool = False,
     objective: str = "error",
     closures: ClosureModel | None = None,
+    observations: ObservationModel | None = None,
     world: World | None = None,
     cost_per_metre: float = 0.0,
     deadline: float | None = None,
@@ -98,6 +100,8 @@ def search_roadmap(
         As for `Planner`.
     closures
         Which loops new poses close. Default: learned from the graph (`learn_closures`).
+    observations
+        Which landmarks new poses observe, and how well. Default: learned from the graph (`learn_observations`).
     world
         Where given, poses must see each other in it to close a loop.
     cost_per_metre
@@ -160,6 +164,7 @@ def search_roadmap(
     engine = "incremental" if find_spec("numba") else "scratch"
     planner = Planner(graph, objective=objective, signature=default_signature(objective), engine=engine)
     model = learn_closures(graph, world=world) if closures is None else closures
+    seeing = learn_observations(graph, world=world) if observations is None else observations
     of_odometry, of_closures = (
         (default_information(graph), closure_information(graph)) if information is None else (np.asarray(information),) * 2
     )
@@ -167,7 +172,15 @@ def search_roadmap(
 
     def predict(paths: list[FloatArray]) -> list[Action]:
         return predict_actions(
-            graph, paths, closures=model, information=information, spacing=spacing, turn=turn, world=world, start=begin
+            graph,
+            paths,
+            closures=model,
+            observations=seeing,
+            information=information,
+            spacing=spacing,
+            turn=turn,
+            world=world,
+            start=begin,
         )
 
     def measure(actions: list[Action]) -> FloatArray:
@@ -176,8 +189,12 @@ def search_roadmap(
         return constant(objective, graph) - planner.decide(actions, proof="none").signatures
 
     evaluations = Evaluations(planner, predict, walks.roadmap.vertices, cost_per_metre, measure=measure)
-    to_poses: FloatArray = np.asarray(KDTree(graph.positions[:, :2]).query(walks.roadmap.vertices)[0])
-    candidates = spread_vias(walks, to_poses < model.radius, _NUM_CANDIDATES)
+    to_poses: FloatArray = np.asarray(KDTree(graph.positions[graph.pose_indices, :2]).query(walks.roadmap.vertices)[0])
+    near = to_poses < model.radius
+    if seeing is not None:
+        to_landmarks = np.asarray(KDTree(graph.positions[graph.is_landmark, :2]).query(walks.roadmap.vertices)[0])
+        near |= to_landmarks < seeing.max_range
+    candidates = spread_vias(walks, near, _NUM_CANDIDATES)
     local = LocalSearch(walks, evaluations, candidates, rng=np.random.default_rng(seed))
 
     def bounds() -> tuple[WalkBound, FrontBounds]:
@@ -189,6 +206,7 @@ def search_roadmap(
             max_length=walks.max_length,
             objective=objective,
             closures=model,
+            observations=seeing,
             spacing=spacing,
             information=of_odometry,
             closure_information=of_closures,

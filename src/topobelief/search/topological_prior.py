@@ -93,6 +93,7 @@ class TopologicalPrior:
 
     tangent_dim: int
     num_free: int
+    dimension: int
     log_det: float
     closures: FloatArray
     earliest: IntArray
@@ -143,6 +144,7 @@ class TopologicalPrior:
         return cls(
             size,
             graph.num_poses - 1,
+            (graph.num_poses - 1) * size * form.multiplicity,
             form.multiplicity * log_det,
             np.broadcast_to(probability * form.matrix(information), (count, size, size)),
             earliest_numbers(seen, pose, min_index_gap),

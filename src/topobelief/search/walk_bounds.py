@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from topobelief.candidates.closures import ClosureModel
+from topobelief.candidates.observations import ObservationModel
 from topobelief.candidates.roadmap import Roadmap
 from topobelief.errors import InvalidInputError, PlanningError, require_choice
 from topobelief.graph.pose_graph import PoseGraph
@@ -18,7 +19,7 @@ from topobelief.search.layers import Layers, build_layers, num_spots
 from topobelief.search.reduced_prior import ReducedPrior
 from topobelief.search.rewards import Rewards, odometry_powers
 from topobelief.search.topological_prior import OBJECTIVES, SeenPrior, TopologicalPrior, WeightForm
-from topobelief.search.ways import Ways, cells_of_pieces, find_sightings, first_pieces
+from topobelief.search.ways import Ways, cells_of_pieces, find_landmarks, find_sightings, first_pieces
 from topobelief.search.window_bound import WindowBound
 from topobelief.search.windows import Windows, find_odometry
 from topobelief.world import World
@@ -44,6 +45,7 @@ def walk_bounds(
     max_length: float,
     objective: str,
     closures: ClosureModel,
+    observations: ObservationModel | None = None,
     spacing: float,
     information: ArrayLike,
     closure_information: ArrayLike | None = None,
@@ -74,6 +76,8 @@ def walk_bounds(
     objective
         "error" (metres), "map", "joint" (nats) or "per_pose" (nats a pose).
     closures
+    observations
+        Which landmarks of the map new poses observe, and how well. Default: none.
     spacing
         Metres from new pose to new pose.
     information : shape (kappa, kappa)
@@ -102,9 +106,13 @@ def walk_bounds(
         Where no walk within the length reaches the goal.
     """
     require_choice("objective", objective, _OBJECTIVES if metric else OBJECTIVES)
+    if not metric and graph.num_landmarks:
+        raise InvalidInputError(
+            "expected a graph of poses alone for the topological form, got landmarks; search by metric=True"
+        )
     omega = np.asarray(information, dtype=np.float64)
     of_closures = omega if closure_information is None else np.asarray(closure_information, dtype=np.float64)
-    pose = graph.num_poses - 1 if pose is None else pose
+    pose = graph.last_pose if pose is None else pose
     if not (math.isfinite(max_length) and max_length >= 0):
         raise InvalidInputError(f"expected a length of at least 0 m, got {max_length}")
     if not (math.isfinite(cost_per_metre) and cost_per_metre >= 0):
@@ -160,8 +168,17 @@ def walk_bounds(
     )
     layers = build_layers(ways, first_vertex, remaining, is_end, whole, delta, pieces_per_pose, cells)
     num_new = max(1, int(layers.records.number.max(initial=1)))
-    sightings = find_sightings(graph, ways, pose, delta, closures, world, num_new)
-    seen = sightings.seen if len(sightings.seen) else np.array([pose])
+    among = int(np.searchsorted(graph.pose_indices, pose))
+    sightings = find_sightings(graph.poses_alone, ways, among, delta, closures, world, num_new)
+    seen = graph.pose_indices[sightings.seen]
+    num_seen_poses, observed, most_landmarks = len(seen), None, 0
+    if observations is not None and graph.num_landmarks:
+        landmarks = find_landmarks(graph, ways, pose, delta, observations, world)
+        sightings, seen = sightings.with_more(landmarks), np.concatenate([seen, landmarks.seen])
+        observed = observations.information(graph.tangent_dim, graph.group.position_dim)
+        most_landmarks = observations.max_per_pose or 0
+    if not len(seen):
+        seen, num_seen_poses = np.array([pose]), 1
     options = {
         "probability": closures.probability,
         "min_index_gap": closures.min_index_gap,
@@ -169,7 +186,7 @@ def walk_bounds(
     }
     poses = ways.poses(graph, pose)
     if metric:
-        prior: SeenPrior = ReducedPrior(graph, pose, seen, of_closures, **options)
+        prior: SeenPrior = ReducedPrior(graph, pose, seen, of_closures, observed=observed, **options)
         powers = odometry_powers(graph.group, poses, graph.positions[pose], omega)
     else:
         form = WeightForm.of(objective, graph, omega, of_closures)
@@ -179,18 +196,40 @@ def walk_bounds(
     fewest = max(0, math.ceil((whole - max_length + to_go[start]) / spacing - 1e-6))
     criterion = Criterion.of(objective, prior, idle, num_new, fewest)
     most = closures.max_per_pose or 0
-    rewards = Rewards(layers, ways, sightings, delta, powers, idle, prior.earliest, most, num_new, driven, prices, cells)
+    rewards = Rewards(
+        layers,
+        ways,
+        sightings,
+        delta,
+        powers,
+        idle,
+        prior.earliest,
+        most,
+        num_new,
+        driven,
+        prices,
+        cells,
+        num_seen_poses,
+        most_landmarks,
+    )
+    counted = "loop closures with the poses of the map" + ("" if observed is None else " and observations of its landmarks")
     covers = (
         f"every walk of the roadmap of at most {max_length:.6g} m"
         + (" to the goal" if goal is not None else " that returns to its start" if return_to_start else "")
-        + ", counting loop closures with the poses of the map, not those among its own new poses; by {} in layers of "
+        + f", counting {counted}, not closures among its own new poses; by {{}} in layers of "
         f"{100 * delta:.3g} cm"
     )
     every = np.arange(len(layers.arcs.source), dtype=np.int32)
     flows = FlowBound(
         prior, criterion, rewards, rewards.background(), vertices, max_length, whole - max_length, covers.format("flows"), every
     )
-    if not isinstance(prior, ReducedPrior) or objective == "error" or most != 1 or len(seen) > _MOST_IN_WINDOWS:
+    if (
+        not isinstance(prior, ReducedPrior)
+        or objective == "error"
+        or most != 1
+        or num_seen_poses < len(seen)
+        or len(seen) > _MOST_IN_WINDOWS
+    ):
         return flows, None
     odometry = find_odometry(graph.group, ways, poses, graph.positions[pose], omega, sightings.first, delta, spacing)
 

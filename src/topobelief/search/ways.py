@@ -9,6 +9,7 @@ neighbours of each are fewer."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ from scipy.spatial import KDTree
 
 from topobelief.arrays import BoolArray, FloatArray, IntArray
 from topobelief.candidates.closures import ClosureModel
+from topobelief.candidates.observations import ObservationModel
 from topobelief.candidates.polyline import distances_to_segments
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg.block_cholesky import Int32Array
@@ -24,6 +26,7 @@ from topobelief.world import World
 from topobelief.world.sight import SeenParts, seen_parts
 
 _ROUNDING = 1e-9
+_LOOSE = 2e-6  # relative: how much further than the rule a landmark counts as in view, beyond the rule's own rounding
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +83,17 @@ class Sightings:
     poses: IntArray
     seen: IntArray
 
+    def with_more(self, more: Sightings) -> Sightings:
+        """These and then others along the same ways; `seen` has first these, then the others."""
+        if not len(more.seen):
+            return self
+        counts = np.stack([np.diff(self.start), np.diff(more.start)], axis=1).ravel()
+        piece: IntArray = np.repeat(np.arange(len(counts)), counts)
+        merged = np.empty(len(piece), dtype=np.int64)
+        merged[piece % 2 == 0], merged[piece % 2 == 1] = self.poses, more.poses + len(self.seen)
+        start = np.concatenate([[0], np.cumsum(counts)])[::2]
+        return Sightings(self.first, start, merged, np.concatenate([self.seen, more.seen]))
+
 
 def first_pieces(lengths: FloatArray, delta: float) -> IntArray:
     """Number of the first piece of each way, and how many there are, shape (E + 1,); the end of a way is one more piece."""
@@ -117,16 +131,81 @@ def find_sightings(
         The largest number of a new pose; poses that are not far enough back even for it are left out.
     """
     way, seen, lower, upper, squared_height = _seen_along(graph, ways, pose, rule, world, latest)
-    first = first_pieces(ways.lengths, delta)
+    always = (seen > pose) | (pose - seen + 1 >= rule.min_index_gap)
+    nearest = 0 if rule.max_per_pose is None else 3 * rule.max_per_pose - 2
+    at, aside = _beside(graph, ways, way, seen, squared_height)
+    return _listed(ways, delta, nearest, way, seen, lower, upper, at, aside, always)
+
+
+def find_landmarks(
+    graph: PoseGraph, ways: Ways, pose: int, delta: float, model: ObservationModel, world: World | None
+) -> Sightings:
+    """Landmarks that may be observed along each way: of those, new poses observe at most `model.max_per_pose`, the nearest.
+
+    From u metres along a way, a landmark abeam at a and b aside of it is seen at the angle atan2(b, a - u): within half of the
+    field of view where u <= a - b / tan(half).
+
+    Parameters
+    ----------
+    graph, ways, pose, delta, world
+        As for `find_sightings`.
+    model
+    """
+    landmarks = np.flatnonzero(graph.is_landmark)
+    height = np.zeros(graph.num_nodes)
+    if graph.group.position_dim > 2:
+        height = graph.positions[:, 2] - graph.positions[pose, 2]
+    middle, reach = (ways.begin + ways.end) / 2, ways.lengths / 2 + model.max_range
+    lists = KDTree(graph.positions[landmarks, :2]).query_ball_point(middle, reach)
+    way = np.repeat(np.arange(len(middle)), [len(near) for near in lists])
+    seen = landmarks[np.concatenate([*(np.array(near, dtype=np.int64) for near in lists), np.zeros(0, dtype=np.int64)])]
+    at, aside = _beside(graph, ways, way, seen, height[seen] ** 2)
+    half = np.sqrt(np.maximum(model.max_range**2 - aside, 0.0))
+    lower, upper = np.maximum(at - half, 0.0), np.minimum(at + half, ways.lengths[way])
+    if model.field_of_view < 2 * math.pi:
+        limit = at - np.sqrt(aside) / math.tan(model.field_of_view / 2)
+        upper = np.minimum(upper, limit + _LOOSE * (1 + np.abs(limit)))
+    kept = np.flatnonzero((aside <= model.max_range**2) & (lower <= upper))
+    lower, upper = lower[kept], upper[kept]
+    if world is not None:
+        parts = seen_parts(world, graph.positions[seen[kept], :2], ways.begin[way[kept]], ways.end[way[kept]])
+        kept = kept[parts.which]
+        length = ways.lengths[way[kept]]
+        lower = np.maximum(lower[parts.which], parts.lower * length)
+        upper = np.minimum(upper[parts.which], parts.upper * length)
+    nonempty = lower <= upper
+    kept, lower, upper = kept[nonempty], lower[nonempty], upper[nonempty]
+    always = np.ones(len(kept), dtype=np.bool_)
+    return _listed(ways, delta, model.max_per_pose or 0, way[kept], seen[kept], lower, upper, at[kept], aside[kept], always)
+
+
+def _beside(
+    graph: PoseGraph, ways: Ways, way: IntArray, seen: IntArray, squared_height: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Metres along the way to where a node is abeam, and its squared distance from the line."""
     offset = graph.positions[seen, :2] - ways.begin[way]
     along = (ways.end - ways.begin)[way] / ways.lengths[way, None]
     at = np.sum(offset * along, axis=1)
-    aside = np.sum(offset**2, axis=1) - at**2 + squared_height
+    return at, np.maximum(np.sum(offset**2, axis=1) - at**2 + squared_height, 0.0)
+
+
+def _listed(
+    ways: Ways,
+    delta: float,
+    nearest: int,
+    way: IntArray,
+    seen: IntArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    at: FloatArray,
+    aside: FloatArray,
+    always: BoolArray,
+) -> Sightings:
+    """Sightings from their rows in any order; columns as `_lists` has them."""
+    first = first_pieces(ways.lengths, delta)
     order = np.argsort(way, kind="stable")
     row_start = np.searchsorted(way[order], np.arange(len(ways.source) + 1))
-    always = (seen > pose) | (pose - seen + 1 >= rule.min_index_gap)
-    nearest = 0 if rule.max_per_pose is None else 3 * rule.max_per_pose - 2
-    columns = (lower[order], upper[order], at[order], np.maximum(aside, 0.0)[order], seen[order], always[order])
+    columns = (lower[order], upper[order], at[order], aside[order], seen[order], always[order])
     start, poses = _lists(first, row_start, ways.lengths, delta, nearest, *columns)
     used = np.unique(poses)
     return Sightings(first, start, np.searchsorted(used, poses), used)
@@ -137,7 +216,7 @@ def _seen_along(
 ) -> tuple[IntArray, IntArray, FloatArray, FloatArray, FloatArray]:
     """Way, pose, and metres along the way from where to where it may be seen; and its height over the way, squared."""
     positions = graph.positions[:, :2]
-    height = graph.positions[:, 2] - graph.positions[pose, 2] if graph.group.position_dim == 3 else np.zeros(graph.num_poses)
+    height = graph.positions[:, 2] - graph.positions[pose, 2] if graph.group.position_dim == 3 else np.zeros(graph.num_nodes)
     middle, reach = (ways.begin + ways.end) / 2, ways.lengths / 2 + rule.radius
     lists = KDTree(positions).query_ball_point(middle, reach)
     way = np.repeat(np.arange(len(middle)), [len(near) for near in lists])
