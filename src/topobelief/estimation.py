@@ -182,14 +182,14 @@ class _Problem:
             if promised <= _CONVERGED:
                 return poses
             before.append(chi2)
-            if not self.linear and len(before) > _PATIENCE and before[-_PATIENCE] - chi2 <= _FLAT * chi2:
-                warnings.warn(
-                    f"chi^2 = {chi2:.6g} fell by less than {100 * _FLAT:g} % in {_PATIENCE} iterations: ranges or bearings "
-                    "leave a flat valley, along which the estimate may still move",
-                    NotOptimizedWarning,
-                    stacklevel=3,
-                )
-                return poses
+        if not self.linear and len(before) > _PATIENCE and before[-_PATIENCE] - chi2 <= _FLAT * chi2:
+            warnings.warn(
+                f"chi^2 = {chi2:.6g} fell by less than {100 * _FLAT:g} % in the last {_PATIENCE} of {max_iterations} iterations: "
+                "ranges or bearings leave a flat valley, along which the estimate may still move",
+                NotOptimizedWarning,
+                stacklevel=3,
+            )
+            return poses
         raise EstimationError(
             f"expected Gauss-Newton to converge in {max_iterations} iterations, got chi^2 = {chi2:.6g} still falling; "
             "look for wrong loop closures or allow more iterations"

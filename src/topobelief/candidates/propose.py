@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from topobelief.arrays import FloatArray
 from topobelief.candidates.closures import ClosureModel
 from topobelief.candidates.diverse_paths import diverse_paths
+from topobelief.candidates.observations import ObservationModel
 from topobelief.candidates.polyline import path_length
 from topobelief.candidates.predicted_factors import KEY_POSE_TURN, predict_actions
 from topobelief.candidates.roadmap import Roadmap, build_roadmap
@@ -48,6 +49,8 @@ class CandidateRule:
         Radians by which a path turns from new pose to new pose; None: by distance only.
     closures
         Which loops the new poses close; None: as learned from the graph.
+    observations
+        Which landmarks the new poses observe; None: as learned from the graph.
     line_of_sight
         Whether loops close only between poses that see each other, and paths must stay in free space.
     information : shape (3, 3), or None
@@ -62,6 +65,7 @@ class CandidateRule:
     spacing: float = 1.0
     turn: float | None = KEY_POSE_TURN
     closures: ClosureModel | None = None
+    observations: ObservationModel | None = None
     line_of_sight: bool = True
     information: FloatArray | None = None
 
@@ -176,6 +180,7 @@ def predict_along(
         spacing=rule.spacing,
         turn=rule.turn,
         closures=rule.closures,
+        observations=rule.observations,
         world=world if rule.line_of_sight else None,
         start=start,
     )

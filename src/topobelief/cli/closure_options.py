@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from topobelief.candidates.closures import ClosureModel
 from topobelief.candidates.learned_closures import learn_closures
+from topobelief.candidates.observations import ObservationModel, learn_observations
 from topobelief.cli.console import Reporter
 from topobelief.cli.plan_options import Closures
 from topobelief.errors import InvalidInputError
@@ -51,4 +52,12 @@ def told_closures(
     """The closure model, learned from the graph where none is stated; told in one line."""
     model = stated if stated is not None else learn_closures(graph, world=world if line_of_sight else None)
     reporter.say(str(model))
+    return model
+
+
+def told_observations(graph: PoseGraph, world: World, reporter: Reporter, *, line_of_sight: bool) -> ObservationModel | None:
+    """How landmarks are observed, learned from the graph and told in one line; None where it has none."""
+    model = learn_observations(graph, world=world if line_of_sight else None)
+    if model is not None:
+        reporter.say(str(model))
     return model

@@ -87,9 +87,19 @@ def convert(
     graph = read_filed(source, reporter, reading=reading)
     if not keeps_edges(target):
         reporter.note(f"{target}: holds the poses alone; edges, their information and ids are not written")
+    elif (graph.reading_codes > 1).any():
+        graph = graph.with_positions()
+        reporter.note(f"{target}: bearings and ranges are written as the positions that they are to first order at these poses")
     write_pose_graph(graph, target)
-    reporter.say(f"{target}: {graph.group.name}, {counted(graph.num_poses, 'pose')}, {counted(graph.num_edges, 'edge')}.")
-    size = {"space": graph.group.name, "num_poses": graph.num_poses, "num_edges": graph.num_edges}
+    landmarks = f"{counted(graph.num_landmarks, 'landmark')}, " if graph.num_landmarks else ""
+    edges = counted(graph.num_edges, "edge")
+    reporter.say(f"{target}: {graph.group.name}, {counted(graph.num_poses, 'pose')}, {landmarks}{edges}.")
+    size = {
+        "space": graph.group.name,
+        "num_poses": graph.num_poses,
+        "num_landmarks": graph.num_landmarks,
+        "num_edges": graph.num_edges,
+    }
     reporter.answer({"file": str(target), **size, "notes": reporter.notes})
 
 

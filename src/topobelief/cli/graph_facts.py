@@ -105,21 +105,30 @@ def describe(path: Path, reporter: Reporter, *, optimized: bool, reading: Readin
 
 def _size(graph: PoseGraph) -> Iterator[Fact]:
     topology = graph.topology
-    gap = np.abs(graph.edges[:, 0] - graph.edges[:, 1])
+    alone = graph.poses_alone
+    gap = np.abs(alone.edges[:, 0] - alone.edges[:, 1])
     closures = int(np.count_nonzero(gap > 1))
     parallel = topology.num_edges - topology.simple().num_edges
     degrees = topology.degrees
-    steps = np.linalg.norm(np.diff(graph.positions, axis=0), axis=1)[np.diff(topology.component_labels) == 0]
+    of_poses = topology.component_labels[graph.pose_indices]
+    steps = np.linalg.norm(np.diff(alone.positions, axis=0), axis=1)[np.diff(of_poses) == 0]
     yield Fact("space", graph.group.name, "space", graph.group.name)
     yield Fact("num_poses", graph.num_poses, "poses", str(graph.num_poses))
+    if graph.num_landmarks:
+        yield Fact("num_landmarks", graph.num_landmarks, "landmarks", str(graph.num_landmarks))
     yield Fact("num_edges", graph.num_edges, "edges", str(graph.num_edges))
+    if graph.num_landmarks:
+        names, counts = np.unique(graph.readings[graph.reading_codes > 0], return_counts=True)
+        told = [f"{n} of {name.replace('_', ' and ')}" for name, n in zip(names.tolist(), counts.tolist(), strict=True)]
+        yield Fact("num_observations", int(counts.sum()), "of these observations of landmarks", ", ".join(told))
     yield Fact("num_loop_closures", closures, "of these loop closures", f"{closures} (not between consecutive poses)")
     yield Fact("num_parallel_edges", parallel, "of these parallel", f"{parallel} (beyond the first between two poses)")
-    most = graph.label(int(degrees.argmax()))
+    highest = int(degrees.argmax())
+    most, what = graph.label(highest), "landmark" if graph.is_landmark[highest] else "pose"
     fixed = [int(graph.ids[index]) for index in graph.fixed]
     yield Fact("fixed", fixed, "fixed in the file", ", ".join(map(node_name, fixed)) or "none")
     yield Fact("mean_degree", float(degrees.mean()), "mean degree", f"{degrees.mean():.2f}")
-    yield Fact("max_degree", int(degrees.max()), "largest degree", f"{degrees.max()} (pose {most})")
+    yield Fact("max_degree", int(degrees.max()), "largest degree", f"{degrees.max()} ({what} {most})")
     parts = topology.num_components
     yield Fact("num_components", parts, "connectivity", "connected" if parts == 1 else f"{parts} components")
     yield Fact("length", float(steps.sum()), "length from pose to pose", f"{steps.sum():.1f} m as filed")
@@ -175,18 +184,18 @@ def _fit(filed: PoseGraph, graph: PoseGraph, *, optimized: bool) -> Iterator[Fac
 
 
 def _topology(graph: PoseGraph) -> Iterator[Fact]:
-    topology, size = graph.topology, graph.num_poses
+    topology, size = graph.topology, graph.num_nodes
     tau = log_num_spanning_trees(topology)
     yield Fact("log_num_spanning_trees", tau, "τ, log number of spanning trees", f"{tau:.4f}")
     if size <= DENSE_SPECTRUM_SIZE:
         exact = von_neumann_entropy(topology)
         yield Fact("von_neumann_entropy", exact, "s_VN, von Neumann entropy", f"{exact:.4f}")
     else:
-        text = f"not computed: some {expected_spectrum_seconds(size):.0f} s for the spectrum of {size} poses"
+        text = f"not computed: some {expected_spectrum_seconds(size):.0f} s for the spectrum of {size} nodes"
         yield Fact("von_neumann_entropy", None, "s_VN, von Neumann entropy", text)
     degrees = von_neumann_entropy_approx(topology)
     yield Fact("von_neumann_entropy_approx", degrees, "ŝ_VN, the same by degrees", f"{degrees:.4f}")
-    signature = spanning_tree_signature(topology, graph.information)
+    signature = spanning_tree_signature(topology, graph.information, kinds=graph.kinds)
     yield Fact("spanning_tree_signature", signature, "s_ST, spanning-tree signature", f"{signature:.4f} nats")
 
 
@@ -206,6 +215,7 @@ def _uncertainty(graph: PoseGraph) -> Iterator[Fact]:
             text = f"{bounds.lower:.4f} … {bounds.upper:.4f} nats"
             yield Fact(key, {"lower": bounds.lower, "upper": bounds.upper}, label, text)
         except InvalidGraphError:
-            yield Fact(key, None, label, "do not apply: they need one block-isotropic noise on all edges")
+            poses_alone = "poses alone and " if graph.num_landmarks else ""
+            yield Fact(key, None, label, f"do not apply: they need {poses_alone}one block-isotropic noise on all edges")
         except IllConditionedError as error:
             yield Fact(key, None, label, f"not known: {error}")

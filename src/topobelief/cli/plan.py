@@ -93,7 +93,7 @@ def plan(
             plan_stages,
             plan_world,
         )
-        from topobelief.cli.closure_options import stated_closures, told_closures
+        from topobelief.cli.closure_options import stated_closures, told_closures, told_observations
         from topobelief.planning.planner import Planner
         from topobelief.planning.registry import default_signature
 
@@ -130,7 +130,9 @@ def plan(
     begin = plan_ends.choose_start(graph, world, reporter, start)
     goals = plan_ends.choose_goals(graph, goal or ())
     model = told_closures(rule.closures, graph, world, reporter, line_of_sight=rule.line_of_sight)
-    rule = replace(rule, closures=model)
+    rule = replace(
+        rule, closures=model, observations=told_observations(graph, world, reporter, line_of_sight=rule.line_of_sight)
+    )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NotOptimizedWarning)  # `read_graph` has told
         planner = Planner(

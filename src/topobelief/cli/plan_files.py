@@ -118,7 +118,12 @@ def document(result: PlanResult) -> dict[str, object]:
         "closure_draws": [asdict(spread) for spread in result.spreads],
         "notes": list(result.notes),
         "topobelief": __version__,
-        "graph": {"num_poses": graph.num_poses, "num_edges": graph.num_edges, "chi2": graph.chi2},
+        "graph": {
+            "num_poses": graph.num_poses,
+            "num_landmarks": graph.num_landmarks,
+            "num_edges": graph.num_edges,
+            "chi2": graph.chi2,
+        },
         "start": (start.place if start.distance(graph) else graph.poses[start.pose]).tolist(),
         "start_pose": {"index": start.pose, "id": int(graph.ids[start.pose])},
         "goals": [{"name": goal.name, "place": goal.place.tolist()} for goal in result.goals],

@@ -182,6 +182,7 @@ def _search_one(
             return_to_start=limits.return_to_start,
             objective=objective,
             closures=rule.closures,
+            observations=rule.observations,
             world=world if rule.line_of_sight else None,
             cost_per_metre=limits.cost_per_metre,
             deadline=limits.seconds,

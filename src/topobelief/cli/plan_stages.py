@@ -22,6 +22,7 @@ from topobelief.planning.decision import Decision
 from topobelief.planning.decision_quality import rank_correlation
 from topobelief.planning.planner import Planner
 from topobelief.report.tables import candidate_table
+from topobelief.wording import counted
 
 EXACT_SECONDS = 5.0
 """How long exact values that the decision did not need may take, for the picture of the bounds."""
@@ -59,7 +60,8 @@ def read_graph(path: Path, reporter: Reporter, *, optimized: bool, reading: Read
     if graph.group.position_dim != 2:
         advice = "if it is planar but for its format, pass --planar"
         raise FileError(path, f"expected a graph in SE(2) to plan in the plane, got one in {graph.group.name}; {advice}")
-    reporter.say(f"{path}: {graph.num_poses} poses, {graph.num_edges} edges")
+    landmarks = f"{counted(graph.num_landmarks, 'landmark')}, " if graph.num_landmarks else ""
+    reporter.say(f"{path}: {graph.num_poses} poses, {landmarks}{graph.num_edges} edges")
     if optimized:
         reporter.say(f"χ² per degree of freedom: {chi2_per_dof(filed)} as filed, {chi2_per_dof(graph)} optimised")
     if message := misfit(graph, optimized=optimized):

@@ -55,7 +55,7 @@ def told_of_poses_outside(graph: PoseGraph, world: World) -> Generator[None]:
 
 def poses_outside(graph: PoseGraph, world: World) -> str | None:
     """How many poses are not in free space, and what that may mean; None where all are."""
-    outside, total = int(np.count_nonzero(~world.contains(graph.positions))), graph.num_poses
+    outside, total = int(np.count_nonzero(~world.contains(graph.positions[graph.pose_indices]))), graph.num_poses
     if not outside:
         return None
     question = ": another map or another frame?" if outside > _DOUBTFUL_SHARE * total else ""

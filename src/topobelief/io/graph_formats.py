@@ -23,7 +23,7 @@ def _toro(graph: PoseGraph) -> str:
 
 
 def _tum(graph: PoseGraph) -> str:
-    return tum_of_path(graph.poses)
+    return tum_of_path(graph.poses[graph.pose_indices])
 
 
 _WRITERS: dict[str, Callable[[PoseGraph], str]] = {".g2o": _g2o, ".graph": _toro, ".toro": _toro, ".tum": _tum}

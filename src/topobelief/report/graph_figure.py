@@ -41,7 +41,9 @@ def draw_graph_figure(graph: PoseGraph, title: str, *, world: World | None = Non
         key += draw_graph(panel, graph, view)
         view.shown_on(panel)
         panel.map_axes()
-        canvas.title(_LEFT, _BOTTOM + height + 0.10, title, f"{graph.num_poses} poses, {graph.num_edges} edges")
+        landmarks = f"{graph.num_landmarks} landmarks, " if graph.num_landmarks else ""
+        size = f"{graph.num_poses} poses, {landmarks}{graph.num_edges} edges"
+        canvas.title(_LEFT, _BOTTOM + height + 0.10, title, size)
         if key:
             canvas.key(key, _LEFT + width + _SIDE_GAP, _BOTTOM + height, corner="upper left")
     return canvas.figure

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from topobelief.arrays import FloatArray, IntArray
 from topobelief.candidates.seen_again import Stretch, closing_edges, seen_again
 from topobelief.candidates.start import Start, find_start
-from topobelief.graph.action import Action
+from topobelief.graph.action import Action, landmark_ends
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.decision import Decision
 from topobelief.report import style
@@ -80,22 +80,27 @@ class Sight:
         Existing poses among their ends, increasing.
     stretches
         Of these, those with most closures first.
+    observed : shape (O, 2, 2)
+        From new poses to the landmarks that they observe.
     """
 
     closures: IntArray
     segments: FloatArray
     seen: IntArray
     stretches: list[Stretch]
+    observed: FloatArray
 
     @classmethod
     def of(cls, graph: PoseGraph, start: Start, action: Action) -> Sight:
         """Of an action that begins at a start."""
         positions = np.concatenate([graph.positions, graph.group.position(action.poses)])[:, :2]
         closing = closing_edges(graph, start.pose, action)
+        observing = landmark_ends(graph, action.edges)
+        observed = positions[action.edges[observing]]
+        closing &= ~observing
         closures = np.sort(action.edges[closing], axis=1)
         seen = np.unique(closures[closures < graph.num_nodes])
-        seen = seen[~graph.is_landmark[seen]]
-        return cls(closures, positions[action.edges[closing]], seen, seen_again(graph, start.pose, action))
+        return cls(closures, positions[action.edges[closing]], seen, seen_again(graph, start.pose, action), observed)
 
     def thinned(self) -> FloatArray:
         """Segments of the shortest closures of each new pose, in the order of the action."""
@@ -199,22 +204,31 @@ def draw_graph(panel: Panel, graph: PoseGraph, view: View) -> list[Entry]:
     inside = ((positions >= low) & (positions <= high)).all(axis=1)
     thin = float(np.clip(1.2 - 0.25 * np.log10(1 + np.count_nonzero(inside)), 0.3, 1.0))
     closing = np.abs(graph.edges[:, 0] - graph.edges[:, 1]) > 1
+    observing = graph.reading_codes > 0
     key: list[Entry] = []
     for label, chosen, colour, width, layer in (
-        ("odometry of the graph", ~closing, style.ODOMETRY, 1.1 * thin, 2),
-        ("loop closures of the graph", closing, style.CLOSURE, 0.9 * thin, 1),
+        ("odometry of the graph", ~closing & ~observing, style.ODOMETRY, 1.1 * thin, 2),
+        ("loop closures of the graph", closing & ~observing, style.CLOSURE, 0.9 * thin, 1),
+        ("observations of landmarks", observing, style.OBSERVATION, 0.4 * thin, 0.8),
     ):
         if chosen.any():
             panel.segments(positions[graph.edges[chosen]], colors=colour, linewidths=width, zorder=layer)
             key.append(Entry(label, color=colour, linewidth=max(width, 0.9)))
+    if graph.num_landmarks:
+        look: dict[str, Any] = {"marker": "^", "markerfacecolor": style.LANDMARK, "markeredgecolor": "white", "markersize": 5.0}
+        panel.line(positions[graph.is_landmark], linestyle="none", markeredgewidth=0.4, zorder=6, **look)
+        key.append(Entry(f"landmarks ({graph.num_landmarks})", linestyle="none", **look))
     return key
 
 
 def draw_sight(panel: Panel, graph: PoseGraph, sight: Sight) -> list[Entry]:
-    """Existing poses that an action sees again as a band beneath the graph, and some of its loop closures."""
-    if not len(sight.closures):
-        return []
+    """Existing poses that an action sees again as a band beneath the graph, some of its loop closures, and its observations."""
     key: list[Entry] = []
+    if len(sight.observed):
+        panel.segments(sight.observed, colors=style.LANDMARK, linewidths=0.6, alpha=0.8, zorder=3)
+        key.append(Entry(f"its predicted observations ({len(sight.observed)})", color=style.LANDMARK, linewidth=1.0))
+    if not len(sight.closures):
+        return key
     if len(sight.seen):
         places, near = graph.positions[:, :2], np.diff(sight.seen) == 1
         ends = np.concatenate([sight.seen[:-1][near], sight.seen]), np.concatenate([sight.seen[1:][near], sight.seen])

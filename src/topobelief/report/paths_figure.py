@@ -96,7 +96,7 @@ def map_size(view: View) -> tuple[float, float]:
 
 def _draw_overview(panel: Panel, world: World, graph: PoseGraph, best: FloatArray, whole: View, view: View) -> None:
     draw_world(panel, world, whole)
-    odometry = graph.edges[np.abs(graph.edges[:, 0] - graph.edges[:, 1]) == 1]
+    odometry = graph.edges[(np.abs(graph.edges[:, 0] - graph.edges[:, 1]) == 1) & (graph.reading_codes == 0)]
     panel.segments(graph.positions[odometry], colors=style.ODOMETRY, linewidths=0.3)
     panel.line(best, color=style.BEST, linewidth=0.8)
     panel.rectangle(view.x_min, view.y_min, *view.size, fill=False, edgecolor=style.INK, linewidth=0.8)
