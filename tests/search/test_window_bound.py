@@ -5,10 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
 
 import topobelief as tb
 from roadmap_walks import Case, random_case
 from topobelief.search.both_bounds import BothBounds
+from topobelief.search.front_bounds import FrontBounds
 from topobelief.search.walk_bounds import walk_bounds
 
 WITH_WALKS = (4, 8, 17, 62, 85, 96, 106, 111)  # of cases with 15 to 70 walks
@@ -87,3 +90,40 @@ def test_there_are_none_for_errors_and_for_several_closures_a_pose():
     assert walk_bounds(case.graph, case.roadmap, objective="error", **case.arguments())[1] is None
     several = replace(case, rule=replace(case.rule, max_per_pose=2))
     assert walk_bounds(several.graph, several.roadmap, objective="map", **several.arguments())[1] is None
+
+
+@settings(max_examples=12)
+@given(st.integers(0, 10_000), st.sampled_from(["error", "map", "joint", "per_pose"]))
+def test_no_walk_is_below_any_bound(seed, objective):
+    """All walks of a random roadmap: not below the bound by windows, nor below that of the front at their length."""
+    case = _one_closure_a_pose(seed)
+    walks = case.walks(60)
+    assume(len(walks) > 1)
+    values, lengths = case.values(objective, walks), np.array([case.length(walk) for walk in walks])
+    tolerance = 1e-9 * np.maximum(1, np.abs(values))
+    flows, windows = walk_bounds(case.graph, case.roadmap, objective=objective, **case.arguments())
+    while windows is not None and not windows.finished:
+        windows.step()
+        assert windows.lower_bound <= values.min() + tolerance.max()
+    plain = values - case.cost_per_metre * lengths
+    front = FrontBounds(flows, float(lengths.min()), case.max_length)
+    flows.step()
+    for _ in range(10):
+        if not front.finished:
+            front.step(lambda length: plain[lengths <= length * (1 + 1e-9)].min(initial=math.inf))
+    metres, bounds = front.curve().T
+    assert (np.append(bounds, -math.inf)[np.searchsorted(metres, lengths)] <= plain + tolerance).all()
+
+
+def test_driven_in_three_dimensions():
+    """A planar graph in SE(3), of any noise: the bound covers its walks too."""
+    case = _one_closure_a_pose(85)
+    graph = case.graph
+    zero, half = np.zeros(graph.num_poses), graph.poses[:, 2] / 2
+    poses = np.column_stack([graph.positions, zero, zero, zero, np.sin(half), np.cos(half)])
+    root = np.random.default_rng(0).normal(size=(6, 6)) + 4 * np.eye(6)
+    spatial = tb.PoseGraph(poses, graph.edges, None, 10 * (root @ root.T + root @ root.T).T)
+    case = replace(case, graph=spatial, information=spatial.information[0])
+    for objective in ("map", "joint"):
+        best = float(case.values(objective, case.walks()).min())
+        assert _bound(case, objective)[0] <= best + 1e-9 * abs(best)

@@ -155,11 +155,11 @@ def in_blocks(poses: IntArray, kappa: int) -> IntArray:
 def _variances(factor: FormFactor, nodes: IntArray) -> FloatArray:
     """Diagonal blocks of the inverse at some nodes, shape (w, b, b); the held node's is 0."""
     at = factor.tree.position[nodes]
-    places = np.sort(at[at >= 0])
+    places: IntArray = np.sort(at[at >= 0])
     paths = factor.paths(places)
     result = np.zeros((len(nodes), factor.block_size, factor.block_size))
     for node in np.flatnonzero(at >= 0).tolist():
-        place = int(np.searchsorted(places, at[node]))
+        place = int(np.searchsorted(places, int(at[node])))
         result[node] = paths.inverse_block(place, place)
     return result
 

@@ -98,21 +98,22 @@ def find_odometry(
     powers = odometry_powers(group, poses, origin, information)
     middle = at(powers, (begin + end) / 2)
     ends = np.stack([at(powers, begin), at(powers, end)])
-    excess = np.linalg.eigvals(np.linalg.solve(middle, ends)).real.max(axis=(0, 2))  # V at both ends is no more than this V
+    ratios: FloatArray = np.real(np.linalg.eigvals(np.linalg.solve(middle, ends))).astype(np.float64)
+    excess: FloatArray = np.max(ratios, axis=(0, 2))  # V at both ends is no more than this V
     information_here = np.maximum(excess, 1.0)[:, None, None] * (1 + 1e-9) * middle
     equal = np.diag(high * scale**2)  # at least the information
     lever = (spacing + 2 * delta) * scale[0] / scale[k]
     sheared = 1 + lever**2 / 2 + lever * np.sqrt(1 + lever**2 / 4)
-    before = (
-        float(excess.max(initial=1.0))
-        * (1 + 1e-9)
-        * sheared
-        * at(odometry_powers(group, poses, origin, equal), (begin + end) / 2)
-    )
+    largest_excess = float(np.max(excess, initial=1.0)) * (1 + 1e-9)
+    before = largest_excess * sheared * at(odometry_powers(group, poses, origin, equal), (begin + end) / 2)
     variances = 1 / (low * scale**2)  # at least the covariance
-    about = np.stack([np.where(np.arange(kappa) < k, variances, 2 * variances), np.zeros(kappa)])
-    about[1, :k] = 2 * variances[k]
-    return Odometry(np.linalg.inv(information_here), np.linalg.slogdet(information_here)[1], before, about)
+    about = np.zeros((2, kappa))
+    about[0, :k], about[0, k:], about[1, :k] = variances[:k], 2 * variances[k:], 2 * variances[k]
+    return Odometry(_inverse(information_here), np.linalg.slogdet(information_here)[1], before, about)
+
+
+def _inverse(matrices: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.inv(matrices), dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,13 +192,13 @@ class Windows:
         prior, sightings = self.prior, self.sightings
         every = np.arange(len(prior.earliest))
         sigma = prior.sigma(every, every)
-        noise: FloatArray = np.linalg.inv(prior.closures)
+        noise = _inverse(prior.closures)
         worth = np.empty(len(keys))
         axes = (0,) * prior.tangent_dim
         for number in np.unique(keys[:, 0]).tolist():
             those = np.flatnonzero(keys[:, 0] == number)
             drift = self.odometry.drift(number - 1, self.spacing)
-            known: FloatArray = np.linalg.inv(prior.variances + drift + noise)
+            known = _inverse(prior.variances + drift + noise)
             worth[those] = _most_added(
                 axes, keys[those, 1], keys[those, 2], number, sigma, known, noise, prior.closures, drift,
                 self.odometry.least, self.odometry.before, sightings.start, sightings.poses, self.first, self.members,
