@@ -24,6 +24,11 @@ SMALLEST = ReproductionPlan(
     num_error_seeds=1,
     num_real_error_seeds=1,
     num_error_paths=4,
+    num_beyond_seeds=1,
+    beyond_noises=(0.35,),
+    beyond_detours=(1.3,),
+    num_beyond_paths=(3, 6),
+    num_beyond_evaluations=20,
 )
 
 

@@ -32,11 +32,11 @@ def test_everything_lands_in_the_folder(small: Path, capsys: pytest.CaptureFixtu
     assert tables == {
         *("planning_sessions", "time_per_action", "random_graphs", "bounds_quality", "path_length"),
         *("real_graphs", "real_bounds", "anytime", "claims"),
-        *("entropy_or_error", "entropy_or_error_summary"),
+        *("entropy_or_error", "entropy_or_error_summary", "beyond_candidates", "beyond_candidates_summary"),
     }
     pngs, pdfs = ({path.stem for path in (small / "figures").glob(f"*.{suffix}")} for suffix in ("png", "pdf"))
     assert pngs == pdfs
-    assert len(pngs) == 11
+    assert len(pngs) == 12
     text = (small / "report.html").read_text(encoding="utf-8")
     assert all(f'id="figure-{name}"' in text for name in pngs)
     table = (small / "claims.md").read_text(encoding="utf-8").splitlines()

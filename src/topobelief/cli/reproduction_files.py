@@ -1,5 +1,5 @@
 """What `topobelief reproduce` leaves behind besides its tables: figures as PNG and PDF, claims.md,
-entropy_or_error.md, report.html."""
+entropy_or_error.md, beyond_candidates.md, report.html."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 from topobelief.cli.plan_files import write_together
 from topobelief.io.files import write_text
 from topobelief.report.canvas import save_figure
+from topobelief.report.reproduction.beyond_table import beyond_markdown
 from topobelief.report.reproduction.choice_table import choices_markdown
 from topobelief.report.reproduction.claims_table import claims_markdown
 from topobelief.report.reproduction.figures import figures_of
@@ -45,6 +46,7 @@ def write(folder: Path, found: Reproduction, tell: Callable[[str], None]) -> Non
         pictures[figure.name] = (folder / "figures" / names[0]).read_bytes()
     write_text(folder / "claims.md", claims_markdown(found.claims))
     write_text(folder / "entropy_or_error.md", choices_markdown(found.choices))
+    write_text(folder / "beyond_candidates.md", beyond_markdown(found.beyond))
     tell("the page")
     tables = sorted(path.stem for path in (folder / "tables").glob("*.csv"))
     write_text(folder / "report.html", page(found, figures, pictures, tables))

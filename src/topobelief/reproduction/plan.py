@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from topobelief.errors import InvalidInputError
+from topobelief.reproduction.beyond_candidates import DETOURS, NUM_PATHS
 from topobelief.reproduction.entropy_or_error import MAPS
+from topobelief.reproduction.planning_sessions import NOISES
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,6 +34,9 @@ class ReproductionPlan:
         Candidates in the figure of path lengths.
     error_maps, num_error_seeds, num_real_error_seeds, num_error_paths
         Entropy or error: the maps, seeds on each and on each real pose graph, and candidates.
+    num_beyond_seeds, beyond_noises, beyond_detours, num_beyond_paths, num_beyond_evaluations
+        The search of the whole roadmap beside candidates: seeds, noises and detours of the decisions, diverse paths made each
+        time, and evaluations of a search.
     files, num_real_actions
         Real pose graphs, and candidates on each.
     quick
@@ -52,6 +57,11 @@ class ReproductionPlan:
     num_error_seeds: int = 30
     num_real_error_seeds: int = 3
     num_error_paths: int = 20
+    num_beyond_seeds: int = 3
+    beyond_noises: tuple[float, ...] = NOISES
+    beyond_detours: tuple[float, ...] = DETOURS
+    num_beyond_paths: tuple[int, ...] = NUM_PATHS
+    num_beyond_evaluations: int = 1000
     files: tuple[Path, ...] = ()
     num_real_actions: int = 50
     quick: bool = False
@@ -72,6 +82,9 @@ class ReproductionPlan:
             num_error_seeds=2,
             num_real_error_seeds=1,
             num_error_paths=10,
+            num_beyond_seeds=1,
+            beyond_noises=NOISES[1:2],
+            beyond_detours=DETOURS[:1],
             files=files,
             num_real_actions=20,
             quick=True,
@@ -89,6 +102,9 @@ class ReproductionPlan:
             ("num_error_seeds", self.num_error_seeds, 1),
             ("num_real_error_seeds", self.num_real_error_seeds, 1),
             ("num_error_paths", self.num_error_paths, 2),
+            ("num_beyond_seeds", self.num_beyond_seeds, 1),
+            ("num_beyond_evaluations", self.num_beyond_evaluations, 1),
+            *(("num_beyond_paths", number, 1) for number in self.num_beyond_paths),
             ("num_real_actions", self.num_real_actions, 2),
             *(("sizes", size, 10) for size in self.sizes),
         ):

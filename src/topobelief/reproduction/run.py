@@ -15,6 +15,7 @@ from typing import Any, Generic, TypeVar
 from topobelief.errors import FileError
 from topobelief.io.row_files import json_rows, rows_of_json, write_rows
 from topobelief.reproduction.anytime import AnytimeRow, anytime_rows
+from topobelief.reproduction.beyond_candidates import BeyondRow, BeyondSummary, beyond_rows, beyond_summaries
 from topobelief.reproduction.bounds_quality import BoundsRow, bounds_rows
 from topobelief.reproduction.claims import Claim, claims
 from topobelief.reproduction.entropy_or_error import ChoiceRow, ChoiceSummary, choice_rows, summaries
@@ -81,9 +82,9 @@ class Reproduction:
         Processor, cores, system, versions.
     seconds
         Spent on measuring, over all runs.
-    actions, bounds, times, random_graphs, lengths, real_actions, real_bounds, choices
+    actions, bounds, times, random_graphs, lengths, real_actions, real_bounds, choices, beyond
         Rows of the experiments.
-    anytime, choice_summaries, claims
+    anytime, choice_summaries, beyond_summaries, claims
         What follows from them.
     """
 
@@ -98,13 +99,16 @@ class Reproduction:
     real_actions: list[RealActionRow]
     real_bounds: list[BoundsRow]
     choices: list[ChoiceRow]
+    beyond: list[BeyondRow]
     anytime: list[AnytimeRow] = field(init=False)
     choice_summaries: list[ChoiceSummary] = field(init=False)
+    beyond_summaries: list[BeyondSummary] = field(init=False)
     claims: list[Claim] = field(init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "anytime", anytime_rows(self.actions, self.real_actions))
         object.__setattr__(self, "choice_summaries", summaries(self.choices))
+        object.__setattr__(self, "beyond_summaries", beyond_summaries(self.beyond))
         object.__setattr__(self, "claims", claims(self.actions, self.times, self.random_graphs, self.choices))
 
 
@@ -187,6 +191,17 @@ def experiments(plan: ReproductionPlan) -> tuple[Experiment[Any], ...]:
                 for place, seed in decided
             },
         ),
+        Experiment(
+            "beyond_candidates",
+            BeyondRow,
+            {
+                f"seed{seed}-xi{xi:g}": lambda seed=seed, xi=xi: beyond_rows(
+                    seed, xi, plan.beyond_detours, plan.num_beyond_paths, plan.num_beyond_evaluations
+                )
+                for seed in range(plan.seed, plan.seed + plan.num_beyond_seeds)
+                for xi in plan.beyond_noises
+            },
+        ),
     )
 
 
@@ -245,9 +260,11 @@ def reproduce(
             real_actions=tables["real_graphs"],
             real_bounds=tables["real_bounds"],
             choices=tables["entropy_or_error"],
+            beyond=tables["beyond_candidates"],
         )
         write_rows(folder / "tables" / "anytime.csv", AnytimeRow, found.anytime)
         write_rows(folder / "tables" / "entropy_or_error_summary.csv", ChoiceSummary, found.choice_summaries)
+        write_rows(folder / "tables" / "beyond_candidates_summary.csv", BeyondSummary, found.beyond_summaries)
         write_rows(folder / "tables" / "claims.csv", Claim, found.claims)
     return found
 

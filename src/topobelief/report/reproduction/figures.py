@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
+from topobelief.report.reproduction.beyond_figure import draw_beyond
 from topobelief.report.reproduction.choice_figure import draw_choices
 from topobelief.report.reproduction.entropy_figures import draw_bounds, draw_signatures
 from topobelief.report.reproduction.length_figure import draw_lengths
@@ -73,6 +74,11 @@ def figures_of(found: Reproduction) -> list[NamedFigure]:
             "entropy_or_error",
             "What each way to choose loses of the map's expected error, and how it ranks the candidates by it.",
             lambda: draw_choices(found.choices),
+        ),
+        NamedFigure(
+            "beyond_candidates",
+            "What the best of 20 and of 200 diverse paths gains, and what a search of the whole roadmap finds.",
+            lambda: draw_beyond(found.beyond),
         ),
     ]
     if found.real_actions:

@@ -22,6 +22,7 @@ from topobelief.arrays import FloatArray
 from topobelief.candidates.polyline import subdivided
 from topobelief.io.json_values import without_nan
 from topobelief.optional import load
+from topobelief.report.reproduction.beyond_table import beyond_cells
 from topobelief.report.reproduction.choice_table import choice_cells
 from topobelief.report.reproduction.figures import NamedFigure
 from topobelief.reproduction.claims import Claim
@@ -66,7 +67,12 @@ def page(found: Reproduction, figures: Sequence[NamedFigure], pictures: Mapping[
             f"{sum(row.chooser == 'error' for row in found.choices)} decisions: what choosing so loses of the expected error "
             "of the map against the best candidate, mean (and worst), and the median rank correlation with it."
         ),
-        choices=_choices(found),
+        choices=_table(choice_cells(found.choices)),
+        beyond_lead=escape(
+            f"The second session, {len({(row.seed, row.xi) for row in found.beyond})} pairs of seed and noise: medians of what "
+            "the way found gains against staying, of the gap that the search leaves, of lengths, and of processor time."
+        ),
+        beyond=_table(beyond_cells(found.beyond)),
         figures="".join(_figure(figure, pictures[figure.name]) for figure in figures),
         tables=", ".join(f'<a href="tables/{escape(name)}.csv">{escape(name)}</a>' for name in tables),
         facts="".join(f"<tr><td>{escape(name)}</td><td>{escape(value)}</td></tr>" for name, value in facts(found).items()),
@@ -123,11 +129,11 @@ def _claim_row(claim: Claim) -> str:
     return f'<tr data-holds="{verdict}" data-topic="{escape(claim.topic)}">{written}</tr>'
 
 
-def _choices(found: Reproduction) -> str:
+def _table(cells: list[list[str]]) -> str:
     """Rows of a table, the first its header."""
-    header, *lines = choice_cells(found.choices)
+    header, *lines = cells
     rows = [(header, "th"), *((line, "td") for line in lines)]
-    return "".join(f"<tr>{''.join(f'<{tag}>{escape(text)}</{tag}>' for text in cells)}</tr>" for cells, tag in rows)
+    return "".join(f"<tr>{''.join(f'<{tag}>{escape(text)}</{tag}>' for text in line)}</tr>" for line, tag in rows)
 
 
 def _figure(figure: NamedFigure, png: bytes) -> str:
