@@ -14,6 +14,7 @@ from pathlib import Path
 
 from topobelief.errors import FileError, InvalidMapError
 from topobelief.io.files import StrPath, read_text
+from topobelief.io.map_3d import is_map_3d
 from topobelief.io.ros_map import Unknown, read_ros_map
 from topobelief.world import World
 
@@ -41,6 +42,8 @@ def read_world(path: StrPath, *, unknown: Unknown = "occupied") -> World:
         return read_ros_map(path, unknown=unknown)
     if suffix == ".csv":
         return read_walls(path)
+    if is_map_3d(path):
+        raise FileError(path, f"expected a floor plan, .yaml, .yml (ROS map) or .csv (walls), got {suffix}, a map in 3D")
     hint = "; name the YAML file that belongs to the image" if suffix in (".pgm", ".png", ".bmp", ".jpg", ".tif") else ""
     raise FileError(
         path, f"expected a map that ends in .yaml, .yml (ROS map) or .csv (walls), got {suffix or 'no suffix'}{hint}"

@@ -14,7 +14,7 @@ from topobelief.planning.planner import Planner
 from topobelief.search.walks import Walk
 
 Predict = Callable[[list[FloatArray]], list[Action]]
-"""From paths, each of shape (waypoints, 2), to what driving each adds to the graph."""
+"""From paths, each of shape (waypoints, dim), to what driving each adds to the graph."""
 
 SAME_VALUE = 1e-9  # relative: values that differ by less are equal
 _NUM_LANDMARKS = 16
@@ -28,7 +28,7 @@ class Evaluations:
     planner
         Its objective is the value.
     predict
-    vertices : shape (V, 2)
+    vertices : shape (V, dim)
         Of the roadmap, metres.
     cost_per_metre
         In the unit of the objective; the value of a walk includes it.
@@ -45,7 +45,7 @@ class Evaluations:
         return len(self.objectives)
 
     def path(self, walk: Walk) -> FloatArray:
-        """Places that a walk passes, shape (waypoints, 2)."""
+        """Places that a walk passes, shape (waypoints, dim)."""
         return self._vertices[list(walk)]
 
     def value(self, walk: Walk) -> float:

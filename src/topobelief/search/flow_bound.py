@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from topobelief.candidates.attitude import Attitude, Legs, lifted
 from topobelief.candidates.closures import ClosureModel
 from topobelief.candidates.roadmap import Roadmap
 from topobelief.errors import InvalidInputError, PlanningError, require_choice
@@ -18,7 +19,7 @@ from topobelief.search.layers import build_layers
 from topobelief.search.reduced_prior import reduced_prior
 from topobelief.search.rewards import Rewards, odometry_powers
 from topobelief.search.ways import Ways, cells_of_pieces, find_sightings, first_pieces
-from topobelief.world import World
+from topobelief.world import FreeSpace
 
 _OBJECTIVES = ("error", "map", "joint", "per_pose")
 _ARCS = 400_000  # aimed at: as many layers as make about so many arcs
@@ -42,12 +43,13 @@ def flow_bound(
     spacing: float,
     information: ArrayLike,
     closure_information: ArrayLike | None = None,
-    world: World | None,
+    world: FreeSpace | None,
     cost_per_metre: float = 0.0,
     return_to_start: bool = False,
     pose: int | None = None,
     edge_costs: ArrayLike | None = None,
     pieces_per_pose: int | None = None,
+    attitude: Attitude | None = None,
 ) -> FlowBound:
     """The bound over the walks from one vertex of a roadmap.
 
@@ -83,6 +85,8 @@ def flow_bound(
         What driving each edge costs beyond its length, in the unit of the objective: time, energy, risk.
     pieces_per_pose
         Into how many layers the spacing is cut. Default: as many as are affordable, from 4 to 40.
+    attitude
+        Of new poses in SE(3), as for `predict_actions`.
 
     Raises
     ------
@@ -120,16 +124,18 @@ def flow_bound(
     vertices = np.concatenate([kept, [-1]])  # the last one: the pose where the robot is
     place = np.full(len(roadmap.vertices), -1)
     place[kept] = np.arange(len(kept))
-    at_pose, begin = len(kept), graph.positions[pose, :2]
-    lead_in = float(np.linalg.norm(roadmap.vertices[start] - begin))
+    at_pose, begin = len(kept), graph.positions[pose]
+    places = lifted(roadmap.vertices, graph, pose)
+    lead_in = float(np.linalg.norm(places[start] - begin))
     has_lead = lead_in > _SAME_PLACE
     lead = [at_pose] if has_lead else []
-    points = np.concatenate([roadmap.vertices[kept], begin[None]])
+    points = np.concatenate([places[kept], begin[None]])
     source = np.r_[place[source], lead].astype(np.int64)
     target = np.r_[place[target], [place[start]] if has_lead else []].astype(np.int64)
-    ways = Ways(source, target, points[source], points[target], np.linalg.norm(points[target] - points[source], axis=1))
-    if len(ways.source) == 0:
+    if len(source) == 0:
         raise PlanningError(f"expected a roadmap with a way of at most {max_length:g} m from the start, got none; allow more")
+    legs = Legs(graph, attitude, dim=roadmap.world.dim)
+    ways = Ways(source, target, points[source], points[target], legs.poses(points[source], points[source], points[target]))
     driven = np.r_[lengths[edges], [0.0] if has_lead else []]
     prices = np.r_[cost_per_metre * lengths[edges] + extra[edges], [0.0] if has_lead else []]
     whole = max_length + (lead_in if has_lead else 0.0)
@@ -161,7 +167,7 @@ def flow_bound(
         min_index_gap=closures.min_index_gap,
         with_errors=objective == "error",
     )
-    powers = odometry_powers(graph.group, ways.poses(graph, pose), graph.positions[pose], omega)
+    powers = odometry_powers(graph.group, ways, graph.positions[pose], omega)
     idle = powers[0, 0] * float(counts_idle)
     fewest = max(0, math.ceil((whole - max_length + to_go[start]) / spacing - 1e-6))
     criterion = Criterion.of(objective, prior, idle, num_new, fewest)

@@ -18,7 +18,7 @@ class Way(ReadOnlyArrays):
 
     Attributes
     ----------
-    path : shape (waypoints, 2)
+    path : shape (waypoints, dim)
         Metres, world frame; its waypoints are vertices of the roadmap. One waypoint: the robot stays where it is.
     action : Action
         What driving it adds to the graph; its cost is that of its length.
@@ -100,7 +100,7 @@ class SearchResult(ReadOnlyArrays):
 
     @property
     def path(self) -> FloatArray:
-        """The best way found, shape (waypoints, 2), metres."""
+        """The best way found, shape (waypoints, dim), metres."""
         return self.best.path
 
     @property

@@ -18,7 +18,9 @@ from numpy.typing import ArrayLike
 from scipy.spatial import KDTree
 
 from topobelief.arrays import FloatArray
+from topobelief.candidates.attitude import Attitude
 from topobelief.candidates.closures import ClosureModel
+from topobelief.candidates.ends import SAME_PLACE, checked_place, shown_place
 from topobelief.candidates.learned_closures import learn_closures
 from topobelief.candidates.predicted_factors import closure_information, default_information, predict_actions
 from topobelief.candidates.roadmap import Roadmap
@@ -35,11 +37,11 @@ from topobelief.search.front import on_front
 from topobelief.search.local_search import LocalSearch, spread_vias
 from topobelief.search.result import SearchResult, Way
 from topobelief.search.walks import Walk, Walks
-from topobelief.world import World
+from topobelief.world import FreeSpace
+from topobelief.world.space import require_room_for, seen_by
 
 _NUM_CANDIDATES = 60  # vertices to lead walks through
 _DIFFERENT = 0.05  # share of the length limit by which alternatives differ (Fréchet)
-_SAME_PLACE = 1e-9  # metres
 _TO_MAKE_BOUND = 8e-6  # seconds for each metre of the limit and edge in reach: 5e-6 to 8e-6 on graphs of 3000 to 10 000 poses
 
 
@@ -53,7 +55,7 @@ def search_roadmap(
     return_to_start: bool = False,
     objective: str = "error",
     closures: ClosureModel | None = None,
-    world: World | None = None,
+    world: FreeSpace | None = None,
     cost_per_metre: float = 0.0,
     deadline: float | None = None,
     gap: float = 0.0,
@@ -64,6 +66,7 @@ def search_roadmap(
     turn: float | None = None,
     information: ArrayLike | None = None,
     start: int | ArrayLike | Start | None = None,
+    attitude: Attitude | None = None,
     earlier: SearchResult | None = None,
     seed: int = 0,
     on_progress: Callable[[SearchProgress], None] | None = None,
@@ -77,8 +80,8 @@ def search_roadmap(
     roadmap
         Its first vertex is where walks begin.
     goal : shape (2,) or (3,), optional
-        Where walks end, metres; a heading is ignored. A place that is no vertex is joined to the roadmap. Default: walks end
-        anywhere.
+        Where walks end, metres: x, y with or without a heading, which is ignored; on a roadmap in space x, y, z. A place that
+        is no vertex is joined to the roadmap. Default: walks end anywhere.
     max_detour
         With a goal and without `max_length`: the limit in lengths of the shortest way, at least 1.
     max_length
@@ -105,7 +108,7 @@ def search_roadmap(
         Stop after about so many exact evaluations, in place of a deadline where runs are to be repeated; at least 1.
     num_alternatives
         How many other ways to return at most.
-    spacing, turn, information, start
+    spacing, turn, information, start, attitude
         As for `predict_actions`; by default new poses stand every metre, and not where the path turns. With a `turn` there is
         no lower bound.
     earlier
@@ -134,6 +137,7 @@ def search_roadmap(
     """
     began = time.monotonic()
     _check_numbers(max_detour, max_length, cost_per_metre, deadline, gap, enough, max_evaluations, num_alternatives)
+    require_room_for(graph, roadmap.world)
     walks = _walks_within(roadmap, goal, max_detour, max_length, return_to_start)
     planner = Planner(graph, objective=objective, engine="incremental" if find_spec("numba") else "scratch")
     model = learn_closures(graph, world=world) if closures is None else closures
@@ -144,11 +148,19 @@ def search_roadmap(
 
     def predict(paths: list[FloatArray]) -> list[Action]:
         return predict_actions(
-            graph, paths, closures=model, information=information, spacing=spacing, turn=turn, world=world, start=begin
+            graph,
+            paths,
+            closures=model,
+            information=information,
+            spacing=spacing,
+            turn=turn,
+            world=world,
+            start=begin,
+            attitude=attitude,
         )
 
     evaluations = Evaluations(planner, predict, walks.roadmap.vertices, cost_per_metre)
-    to_poses: FloatArray = np.asarray(KDTree(graph.positions[:, :2]).query(walks.roadmap.vertices)[0])
+    to_poses: FloatArray = np.asarray(KDTree(seen_by(roadmap.world, graph.positions)).query(walks.roadmap.vertices)[0])
     candidates = spread_vias(walks, to_poses < model.radius, _NUM_CANDIDATES)
     local = LocalSearch(walks, evaluations, candidates, rng=np.random.default_rng(seed))
 
@@ -168,6 +180,7 @@ def search_roadmap(
             cost_per_metre=cost_per_metre,
             return_to_start=return_to_start,
             pose=begin.pose,
+            attitude=attitude,
         )
 
     stay = Action(np.zeros((0, graph.poses.shape[1])), np.zeros((0, 2), np.int64), of_odometry)
@@ -259,18 +272,14 @@ def _walks_within(
         return Walks(roadmap, 0 if return_to_start else None, max_length)
     if return_to_start:
         raise InvalidInputError("expected a goal or return_to_start, got both; leave out the goal to return to the start")
-    place = np.asarray(goal, dtype=np.float64)
-    if place.shape not in ((2,), (3,)) or not np.isfinite(place).all():
-        raise InvalidInputError(f"expected a finite goal (x, y) or (x, y, theta), got {goal!r}")
-    apart = np.linalg.norm(roadmap.vertices - place[:2], axis=1)
+    place = checked_place(roadmap.world, goal, "goal")
+    apart = np.linalg.norm(roadmap.vertices - place, axis=1)
     end = int(np.argmin(apart))
-    if apart[end] > _SAME_PLACE:
+    if apart[end] > SAME_PLACE:
         roadmap, end = roadmap.between(roadmap.vertices[0], place), 1
     shortest = float(roadmap.distances_to(end)[0])
     if math.isinf(shortest):
-        raise PlanningError(
-            f"expected a goal that the roadmap leads to, got ({place[0]:g}, {place[1]:g}); build a roadmap for it"
-        )
+        raise PlanningError(f"expected a goal that the roadmap leads to, got {shown_place(place)}; build a roadmap for it")
     walks = Walks(roadmap, end, max_detour * shortest if max_length is None else max_length)
     if shortest > walks.limit:
         raise PlanningError(
@@ -289,6 +298,6 @@ def _walks_of(earlier: SearchResult | None, roadmap: Roadmap) -> list[Walk]:
         distances, vertices = tree.query(way.path)
         walk = tuple(np.atleast_1d(vertices).tolist())
         joined = all((min(pair), max(pair)) in edges for pair in itertools.pairwise(walk))
-        if joined and np.max(distances) <= _SAME_PLACE:
+        if joined and np.max(distances) <= SAME_PLACE:
             walks.append(walk)
     return walks

@@ -16,12 +16,13 @@ from scipy.spatial import KDTree
 
 from topobelief.arrays import BoolArray, FloatArray, IntArray
 from topobelief.candidates.closures import ClosureModel
-from topobelief.candidates.polyline import distances_to_segments
+from topobelief.geometry.segments import distances_to_segments
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg.block_cholesky import Int32Array
 from topobelief.linalg.compiled import compiled
-from topobelief.world import World
+from topobelief.world import FreeSpace
 from topobelief.world.sight import seen_parts
+from topobelief.world.space import seen_by
 
 _ROUNDING = 1e-9
 
@@ -34,31 +35,27 @@ class Ways:
     ----------
     source, target : shape (E,)
         Vertices.
-    begin, end : shape (E, 2)
+    begin, end : shape (E, k)
         Metres, world frame.
-    lengths : shape (E,)
-        Metres.
+    poses : shape (E, pose_size)
+        Of the robot at the beginning of each way; it is turned so all along it.
     """
 
     source: IntArray
     target: IntArray
     begin: FloatArray
     end: FloatArray
-    lengths: FloatArray
+    poses: FloatArray
 
     @property
-    def headings(self) -> FloatArray:
-        """Direction of travel, radians, shape (E,)."""
-        along = self.end - self.begin
-        return np.arctan2(along[:, 1], along[:, 0])
+    def lengths(self) -> FloatArray:
+        """Metres, shape (E,)."""
+        return np.linalg.norm(self.end - self.begin, axis=1)
 
-    def poses(self, graph: PoseGraph, pose: int) -> FloatArray:
-        """Upright poses at the beginning of each way, heading along it, at the height of a pose of the graph."""
-        if graph.group.pose_size == 3:
-            return np.column_stack([self.begin, self.headings])
-        zero, half = np.zeros(len(self.source)), self.headings / 2
-        height = np.full(len(self.source), graph.positions[pose, 2])
-        return np.column_stack([self.begin, height, zero, zero, np.sin(half), np.cos(half)])
+    @property
+    def directions(self) -> FloatArray:
+        """Unit vectors in the direction of travel, world frame, shape (E, k)."""
+        return (self.end - self.begin) / self.lengths[:, None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +85,7 @@ def first_pieces(lengths: FloatArray, delta: float) -> IntArray:
 
 
 def cells_of_pieces(ways: Ways, delta: float, cell: float) -> Int32Array:
-    """Label of the square of the plane in which the middle of each piece is, from 0 on, shape (P,)."""
+    """Label of the square of the plane, or the cube of space, in which the middle of each piece is, from 0 on, shape (P,)."""
     first = first_pieces(ways.lengths, delta)
     way = np.repeat(np.arange(len(ways.lengths)), np.diff(first))
     piece: IntArray = np.arange(int(first[-1])) - first[way]
@@ -99,7 +96,7 @@ def cells_of_pieces(ways: Ways, delta: float, cell: float) -> Int32Array:
 
 
 def find_sightings(
-    graph: PoseGraph, ways: Ways, pose: int, delta: float, rule: ClosureModel, world: World | None, latest: int
+    graph: PoseGraph, ways: Ways, pose: int, delta: float, rule: ClosureModel, world: FreeSpace | None, latest: int
 ) -> Sightings:
     """What is seen along each way.
 
@@ -116,12 +113,11 @@ def find_sightings(
     latest
         The largest number of a new pose; poses that are not far enough back even for it are left out.
     """
-    way, seen, lower, upper, squared_height = _seen_along(graph, ways, pose, rule, world, latest)
+    way, seen, lower, upper = _seen_along(graph, ways, pose, rule, world, latest)
     first = first_pieces(ways.lengths, delta)
-    offset = graph.positions[seen, :2] - ways.begin[way]
-    along = (ways.end - ways.begin)[way] / ways.lengths[way, None]
-    at = np.sum(offset * along, axis=1)
-    aside = np.sum(offset**2, axis=1) - at**2 + squared_height
+    offset = graph.positions[seen] - ways.begin[way]
+    at = np.sum(offset * ways.directions[way], axis=1)
+    aside = np.sum(offset**2, axis=1) - at**2
     order = np.argsort(way, kind="stable")
     row_start = np.searchsorted(way[order], np.arange(len(ways.source) + 1))
     always = (seen > pose) | (pose - seen + 1 >= rule.min_index_gap)
@@ -133,26 +129,24 @@ def find_sightings(
 
 
 def _seen_along(
-    graph: PoseGraph, ways: Ways, pose: int, rule: ClosureModel, world: World | None, latest: int
-) -> tuple[IntArray, IntArray, FloatArray, FloatArray, FloatArray]:
-    """Way, pose, and metres along the way from where to where it may be seen; and its height over the way, squared."""
-    positions = graph.positions[:, :2]
-    height = graph.positions[:, 2] - graph.positions[pose, 2] if graph.group.position_dim == 3 else np.zeros(graph.num_poses)
+    graph: PoseGraph, ways: Ways, pose: int, rule: ClosureModel, world: FreeSpace | None, latest: int
+) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+    """Way, pose, and metres along the way from where to where it may be seen."""
+    positions = graph.positions
     middle, reach = (ways.begin + ways.end) / 2, ways.lengths / 2 + rule.radius
     lists = KDTree(positions).query_ball_point(middle, reach)
     way = np.repeat(np.arange(len(middle)), [len(near) for near in lists])
     seen = np.concatenate([*(np.array(near, dtype=np.int64) for near in lists), np.zeros(0, dtype=np.int64)])
     far_enough_back = (seen > pose) | (pose - seen + latest >= rule.min_index_gap)
     distance = distances_to_segments(positions[seen], ways.begin[way], ways.end[way])
-    kept = far_enough_back & (distance**2 + height[seen] ** 2 < rule.radius**2) & _aligned(graph, ways, pose, way, seen, rule)
+    kept = far_enough_back & (distance < rule.radius) & _aligned(graph, ways, way, seen, rule)
     way, seen = way[kept], seen[kept]
-    along = (ways.end - ways.begin)[way] / ways.lengths[way, None]
     offset = positions[seen] - ways.begin[way]
-    at = np.sum(offset * along, axis=1)
-    half = np.sqrt(np.maximum(rule.radius**2 - height[seen] ** 2 - np.sum(offset**2, axis=1) + at**2, 0.0))
+    at = np.sum(offset * ways.directions[way], axis=1)
+    half = np.sqrt(np.maximum(rule.radius**2 - np.sum(offset**2, axis=1) + at**2, 0.0))
     lower, upper = np.maximum(at - half, 0.0), np.minimum(at + half, ways.lengths[way])
     if world is not None:
-        parts = seen_parts(world, positions[seen], ways.begin[way], ways.end[way])
+        parts = seen_parts(world, *(seen_by(world, places) for places in (positions[seen], ways.begin[way], ways.end[way])))
         length = ways.lengths[way][parts.which]
         lower, upper = (
             np.maximum(lower[parts.which], parts.lower * length),
@@ -161,11 +155,11 @@ def _seen_along(
         way, seen = way[parts.which], seen[parts.which]
         overlap = lower <= upper
         way, seen, lower, upper = way[overlap], seen[overlap], lower[overlap], upper[overlap]
-    return way, seen, lower, upper, height[seen] ** 2
+    return way, seen, lower, upper
 
 
-def _aligned(graph: PoseGraph, ways: Ways, pose: int, way: IntArray, seen: IntArray, rule: ClosureModel) -> BoolArray:
-    relative = graph.group.between(ways.poses(graph, pose)[way], graph.poses[seen])
+def _aligned(graph: PoseGraph, ways: Ways, way: IntArray, seen: IntArray, rule: ClosureModel) -> BoolArray:
+    relative = graph.group.between(ways.poses[way], graph.poses[seen])
     turned = np.linalg.norm(graph.group.rotation_vector(relative), axis=1)
     return turned <= rule.angle * (1 + _ROUNDING) + _ROUNDING
 
