@@ -111,7 +111,7 @@ def find_candidates(
 def _described(routes: Routes, begin: Start, goal: Goal, rule: CandidateRule) -> str:
     paths, lengths = routes.paths, routes.lengths
     if routes.roadmap.region is None:
-        told = "which differ by their distance from each other"
+        told = "kept apart by their distance"
     else:
         classes = count_classes(routes.roadmap, paths)
         told = ("" if classes.is_exact else "at least ") + counted(classes.number, "homotopy class", "homotopy classes")

@@ -75,8 +75,9 @@ def _free_cells(path: StrPath, unknown: Unknown) -> BoolArray:
     read_head(path, 1)  # says what is wrong with a path
     try:
         cells: NDArray[Any] = np.lib.format.open_memmap(path, mode="r")  # of the size that it states, or refused
-    except (ValueError, OSError, EOFError, SyntaxError, TypeError, KeyError, OverflowError, MemoryError) as error:
-        raise FileError(path, f"expected a grid as numpy.save writes it, got: {str(error)[:120]}") from None
+    except Exception as error:  # of whatever kind: a header that is none gets as far as Python's parser
+        reason = str(error).splitlines() or [type(error).__name__]
+        raise FileError(path, f"expected a grid as numpy.save writes it, got: {reason[0][:120]}") from None
     if cells.ndim != 3 or cells.size == 0 or cells.dtype.kind not in "biuf":
         raise FileError(path, f"expected a grid of numbers of shape (nx, ny, nz), got {cells.dtype} of {cells.shape}")
     if cells.dtype.kind == "b":

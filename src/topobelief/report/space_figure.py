@@ -1,7 +1,7 @@
 """A decision in space from above and from the side: heights by colour, with the candidates and what the chosen one sees again.
 
-A plan view shows where paths lead and, by colour, on which floor; the side view below, along the longer side of the scene,
-shows how high.
+A plan view shows where paths lead and, by colour, on which floor; the view from the side below it, with the same x, shows how
+high.
 """
 
 from __future__ import annotations
@@ -30,12 +30,14 @@ from topobelief.world import World3D
 from topobelief.world.voxels import Voxels
 
 _WIDTHS, _HEIGHTS = (2.6, 5.4), (2.6, 5.6)  # inches, of the plan view
-_SIDE_HEIGHTS = (0.7, 1.8)  # inches, of the view from the side
+_SIDE_HEIGHTS = (0.8, 5.6)  # inches, of the view from the side
+_TOTAL_HEIGHT = 7.2  # inches, of both where they are to scale
+_TOLD_ZOOM = 1.2  # by which heights are enlarged, from which on it is said
 _LEFT, _BOTTOM, _TOP, _BETWEEN, _RIGHT = 0.70, 0.50, 0.72, 0.42, 2.75
 _PADDING = 0.04
 _HEIGHT_COLOURS = "cividis"
 _FLAT = 0.1  # metres of height below which colours of height say nothing
-_ABOVE = np.array([0, 1])
+_ABOVE, _FROM_SIDE = np.array([0, 1]), np.array([0, 2])  # the axes of both views
 
 
 def draw_space(
@@ -57,7 +59,7 @@ def draw_space(
     graph
         The prior, in SE(3).
     world
-        Where the robot may be; of a map the occupied cubes are drawn, from above the lighter the lower.
+        Where the robot may be; of a map the occupied cubes are drawn, the darker the more of them stand one behind another.
     paths
         K polylines of shape (waypoints, 3), metres.
     action
@@ -84,28 +86,26 @@ def draw_space(
     heights = Normalize(
         float(graph.positions[:, 2].min()), float(max(graph.positions[:, 2].max(), graph.positions[:, 2].min() + _FLAT))
     )
-    along = int(np.argmax((high - low)[:2]))
-    sides = np.array([along, 2])
+    across, up, tall = (high - low).tolist()
     with style.style():
-        aspect = float((high - low)[1] / (high - low)[0])
-        width = float(np.clip(_HEIGHTS[1] / aspect, *_WIDTHS))
-        height = float(np.clip(width * aspect, *_HEIGHTS))
-        side = float(np.clip(width * (high - low)[2] / (high - low)[along], *_SIDE_HEIGHTS))
+        width = float(np.clip(_TOTAL_HEIGHT * across / (up + tall), *_WIDTHS))
+        height = float(np.clip(width * up / across, *_HEIGHTS))
+        natural = width * tall / across
+        side = float(np.clip(natural, *_SIDE_HEIGHTS))
         canvas = Canvas(_LEFT + width + _RIGHT, _BOTTOM + side + _BETWEEN + height + _TOP)
         bottom = _BOTTOM + side + _BETWEEN
         panel = canvas.panel(_LEFT, bottom, width, height)
         key = _draw(panel, _ABOVE, graph, world, paths, sight, best, begin, goals, heights)
         view_low, view_high = _shaped(low[_ABOVE], high[_ABOVE], height / width)
         panel.limits((view_low[0], view_high[0]), (view_low[1], view_high[1]))
-        panel.axes.set(xlabel="x (m)", ylabel="y (m)")
+        panel.axes.set(xlabel="", ylabel="y (m)")
         from_side = canvas.panel(_LEFT, _BOTTOM, width, side)
-        _draw(from_side, sides, graph, world, paths, sight, best, begin, goals, heights)
-        from_side.limits((float(low[along]), float(high[along])), (float(low[2]), float(high[2])))
-        from_side.axes.set(xlabel="", ylabel="z (m)")
-        from_side.axes.text(
-            0.995, 0.04, f"from the side, along {'xy'[along]}", transform=from_side.axes.transAxes, ha="right", fontsize=7,
-            color=style.MUTED,
-        )  # fmt: skip
+        _draw(from_side, _FROM_SIDE, graph, world, paths, sight, best, begin, goals, heights)
+        from_side.limits((float(view_low[0]), float(view_high[0])), (float(low[2]), float(high[2])))
+        from_side.axes.set(xlabel="x (m)", ylabel="z (m)")
+        zoom = side / natural
+        told = f"from the side, heights {zoom:.2g} times as large" if zoom > _TOLD_ZOOM else "from the side"
+        canvas.text(_LEFT + width, _BOTTOM + side + 0.05, told, align="right", fontsize=7, color=style.MUTED)
         right = _LEFT + width + 0.25
         canvas.key(key, right, bottom + height, corner="upper left")
         _height_bar(canvas, heights, right, bottom)
@@ -160,15 +160,14 @@ def _draw(
         panel.line(seen, markersize=5.5, zorder=2, **look)
         key.append(Entry(f"poses it sees again ({len(sight.seen)})", markersize=6, **look))
     colours = cast("Any", ScalarMappable)(heights, _HEIGHT_COLOURS)
+    middle = float(np.median(positions[:, 2]))
     odometry = graph.edges[~closing]
     if len(odometry):
         behind = next(axis for axis in range(3) if axis not in axes)
         order = np.argsort(positions[odometry].mean(axis=1)[:, behind], kind="stable")
         ends = positions[odometry[order]]
         panel.segments(ends[:, :, axes], colors=colours.to_rgba(ends.mean(axis=1)[:, 2]), linewidths=0.9, zorder=3)
-        key.append(
-            Entry("odometry of the graph, by height", color=colours.to_rgba(np.mean(heights.vmin or 0.0)), linewidth=1.2)
-        )
+        key.append(Entry("odometry of the graph, by height", color=colours.to_rgba(middle), linewidth=1.2))
     others = [path for index, path in enumerate(paths) if index != best and len(path) > 1]
     for path in others:
         panel.line(path[:, axes], color=style.SURVIVOR, linewidth=0.9, alpha=0.9, zorder=5)
@@ -201,7 +200,7 @@ def _draw_walls(panel: Panel, axes: IntArray, world: World3D) -> list[Entry]:
         share.T, origin="lower", extent=(low[axes[0]], high[axes[0]], low[axes[1]], high[axes[1]]), cmap="Greys", vmin=0,
         vmax=1.8, zorder=0, aspect="auto", interpolation="nearest",
     )  # fmt: skip
-    return [Entry("occupied, darker where higher", patch=True, facecolor="#B9BBC0")]
+    return [Entry("occupied, darker: more of the column", patch=True, facecolor="#B9BBC0")]
 
 
 def _height_bar(canvas: Canvas, heights: Normalize, x: float, y: float) -> None:

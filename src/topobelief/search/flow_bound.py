@@ -25,7 +25,7 @@ _OBJECTIVES = ("error", "map", "joint", "per_pose")
 _ARCS = 400_000  # aimed at: as many layers as make about so many arcs
 _FINEST, _COARSEST = 40, 3  # pieces per spacing
 _FINE = 10  # pieces per pose; where more are affordable, steps are cheap and splitting does without cells
-_VARIABLES = 2000  # at most so many pairs of a new pose and a cell
+_ROWS = 6000  # at most so many for all pairs of a new pose and a cell, kappa for each
 _MOST_CELLS = 80
 _SAME_PLACE = 1e-9  # metres
 _ROUNDING = 1e-9  # relative; bounds are lowered by it
@@ -152,7 +152,10 @@ def flow_bound(
     first_vertex = at_pose if has_lead else int(place[start])
     counts_idle = objective in ("joint", "per_pose")
     cells = _cells(
-        ways, delta, closures.radius, 1 if counts_idle or pieces_per_pose > _FINE else round(_VARIABLES * spacing / whole)
+        ways,
+        delta,
+        closures.radius,
+        1 if counts_idle or pieces_per_pose > _FINE else round(_ROWS * spacing / (graph.tangent_dim * whole)),
     )
     layers = build_layers(ways, first_vertex, remaining, is_end, whole, delta, pieces_per_pose, cells)
     num_new = max(1, int(layers.records.number.max(initial=1)))

@@ -96,17 +96,34 @@ class Tubes:
         return Parts(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
 
     def _parts(self, starts: FloatArray, ends: FloatArray, radius: float, first: int = 0) -> Parts:
-        """What lies in each capsule of a radius; ways are numbered from `first` on."""
-        a, along = starts * self._stretch, (ends - starts) * self._stretch
+        """What lies in each capsule of a radius; ways are numbered from `first` on.
+
+        A way both of whose ends lie in one capsule lies in it as a whole: of such ways that is all that is told.
+        """
+        a, b = starts * self._stretch, ends * self._stretch
+        whole = self._within_one(a, b, radius)
+        open_ = np.flatnonzero(~whole)
+        a, along = a[open_], (b - a)[open_]
         half = np.linalg.norm(along, axis=1) / 2
         lists = self._tree.query_ball_point(a + along / 2, half + self._reach + radius)
         which, segment = pairs_of_lists(lists)
         lower, upper = _within_capsules(a[which], along[which], self._a[segment], self._b[segment], radius)
-        some = lower < upper
-        still = (half[which] == 0) & (distances_to_segments(a[which], self._a[segment], self._b[segment]) < radius)
-        lower, upper = np.where(still, 0.0, lower), np.where(still, 1.0, upper)
-        kept = some | still
-        return Parts(which[kept] + first, lower[kept], upper[kept])
+        kept = lower < upper
+        whole_ways = np.flatnonzero(whole)
+        return Parts(
+            np.concatenate([whole_ways, open_[which[kept]]]) + first,
+            np.concatenate([np.zeros(len(whole_ways)), lower[kept]]),
+            np.concatenate([np.ones(len(whole_ways)), upper[kept]]),
+        )
+
+    def _within_one(self, a: FloatArray, b: FloatArray, radius: float) -> BoolArray:
+        """Whether both ends of each way, as stretched places, are in a capsule near one of them."""
+        result = np.zeros(len(a), dtype=bool)
+        for ends in (b, a):
+            segment = self._tree.query(ends)[1]
+            depth = [distances_to_segments(places, self._a[segment], self._b[segment]) < radius for places in (a, b)]
+            result |= depth[0] & depth[1]
+        return result
 
     def nearest_free_place(self, place: FloatArray, radius: float) -> FloatArray | None:
         """About the nearest place with more room than a radius; None where the tube is too narrow."""

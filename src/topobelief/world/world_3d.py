@@ -104,10 +104,12 @@ class World3D:
             if corners.shape != (2, 3) or not np.isfinite(corners).all() or not (corners[0] < corners[1]).all():
                 raise InvalidMapError(f"expected bounds as two opposite corners (x, y, z), got {corners.tolist()}")
             low, high = corners
-        low = np.floor(low / resolution) * resolution
-        sides = np.ceil((high - low) / resolution)
-        if not sides.prod() <= MOST_CELLS:
-            size = " × ".join(f"{side:.4g}" for side in (high - low).tolist())
+        with np.errstate(over="ignore", invalid="ignore"):
+            low = np.floor(low / resolution) * resolution
+            sides = np.ceil((high - low) / resolution)
+            fits = sides.prod() <= MOST_CELLS
+        if not fits:
+            size = " × ".join(f"{resolution * side:.4g}" for side in sides.tolist())
             raise InvalidMapError(
                 f"expected points over at most {MOST_CELLS} cubes of {resolution:g} m, got an extent of {size} m; "
                 "choose a larger resolution, or remove points that are far away"
