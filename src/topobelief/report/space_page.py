@@ -21,6 +21,7 @@ from topobelief.world import World3D
 from topobelief.world.voxels import Voxels
 
 _MOST_CUBES = 40_000  # drawn
+_EYE = {"x": 1.5, "y": -1.8, "z": 1.3}  # of the one who looks, in sides of the scene
 _DIGITS = 3  # of coordinates, millimetres
 
 _PAGE = """<!DOCTYPE html>
@@ -77,17 +78,15 @@ def space_page(
             "size": 2,
             "color": walls[:, 2].round(_DIGITS).tolist(),
             "colorscale": "Greys",
-            "opacity": 0.25,
+            "opacity": 0.15,
             "symbol": "square",
         }
         data.append(_trace("occupied", walls, mode="markers", marker=marker, hoverinfo="skip"))
     data.append(_lines("loop closures of the graph", positions[graph.edges[closing]], style.CLOSURE, 1, visible="legendonly"))
-    line = {"width": 4, "color": positions[:, 2].round(_DIGITS).tolist(), "colorscale": "Cividis"}
-    odometry = _trace("odometry of the graph, by height", _joined(positions[graph.edges[~closing]]), mode="lines", line=line)
-    line["color"] = [
-        None if np.isnan(z) else z for z in _joined(positions[graph.edges[~closing]])[:, 2].round(_DIGITS).tolist()
-    ]
-    data.append(odometry | {"hoverinfo": "skip"})
+    steps = _joined(positions[graph.edges[~closing]])
+    heights = np.where(np.isnan(steps[:, 2]), positions[:, 2].mean(), steps[:, 2]).round(_DIGITS).tolist()
+    line = {"width": 4, "color": heights, "colorscale": "Cividis"}
+    data.append(_trace("odometry of the graph, by height", steps, mode="lines", line=line, hoverinfo="skip"))
     seen = {"size": 4, "color": style.PREDICTED_CLOSURE, "opacity": 0.6}
     data.append(_trace(f"poses it sees again ({len(sight.seen)})", positions[sight.seen], mode="markers", marker=seen))
     order = [index for index in range(len(paths)) if index != best] + [best]
@@ -103,7 +102,7 @@ def space_page(
         data.append(_trace("goal" if len(goals) == 1 else "goals", goals, mode="markers", marker=look))
     axes = {f"{axis}axis": {"title": {"text": f"{axis} (m)"}} for axis in "xyz"}
     layout = {
-        "scene": {**axes, "aspectmode": "data"},
+        "scene": {**axes, "aspectmode": "data", "camera": {"eye": _EYE}},
         "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
         "legend": {"x": 0.01, "y": 0.99, "bgcolor": "rgba(255,255,255,0.7)"},
         "hoverlabel": {"namelength": -1},
