@@ -34,6 +34,7 @@ from .io.formats import read_pose_graph as read_pose_graph
 from .io.g2o import read_g2o as read_g2o
 from .io.g2o import write_g2o as write_g2o
 from .io.graph_formats import write_pose_graph as write_pose_graph
+from .io.map_3d import read_world_3d as read_world_3d
 from .io.path_formats import read_path as read_path
 from .io.path_formats import write_path as write_path
 from .io.reading import ReadingOptions as ReadingOptions
@@ -64,3 +65,4 @@ from .signatures.von_neumann import von_neumann_entropy as von_neumann_entropy
 from .signatures.von_neumann import von_neumann_entropy_approx as von_neumann_entropy_approx
 from .version import __version__ as __version__
 from .world.world import World as World
+from .world.world_3d import World3D as World3D

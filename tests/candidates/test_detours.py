@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from topobelief.candidates.detours import Balls, DetourSearch
-from topobelief.candidates.polyline import distances_to_segments, path_length
+from topobelief.candidates.polyline import path_length
 from topobelief.candidates.roadmap import Roadmap, build_roadmap
+from topobelief.geometry.segments import distances_to_segments
 from topobelief.world import World
 
 START, GOAL = (1.0, 5.0), (19.0, 5.0)

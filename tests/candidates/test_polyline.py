@@ -10,7 +10,6 @@ from shapely import LineString, Point
 
 from topobelief.candidates.polyline import (
     checked_path,
-    distances_to_segments,
     path_length,
     path_poses,
     sampled,
@@ -18,6 +17,7 @@ from topobelief.candidates.polyline import (
     subdivided,
 )
 from topobelief.errors import InvalidInputError
+from topobelief.geometry.segments import distances_to_segments
 
 
 def test_poses_of_a_path_head_as_they_came() -> None:
@@ -87,7 +87,7 @@ def test_repeated_waypoints_are_dropped() -> None:
     assert path_length([(3, 3)]) == 0
 
 
-@pytest.mark.parametrize("path", [[], [(1, 2, 3)], [(np.nan, 0)], [1, 2], "abc"])
+@pytest.mark.parametrize("path", [[], [(1, 2, 3, 4)], [(np.nan, 0)], [1, 2], "abc"])
 def test_what_is_no_path_is_refused(path: object) -> None:
     with pytest.raises(InvalidInputError, match="expected path"):
         checked_path(path)

@@ -290,10 +290,10 @@ class TestStart:
         with pytest.raises(InvalidInputError, match="expected start"):
             predict(self.GRAPH, [(2, 0), (2, -3)], start=start)
 
-    def test_in_space_a_place_has_no_height(self) -> None:
+    def test_in_space_a_place_has_a_height(self) -> None:
         graph = PoseGraph([[0, 0, z, 0, 0, 0, 1] for z in range(2)], [(0, 1)], None, np.eye(6))
         assert predict(graph, [(0, 0), (1, 0)], start=0).poses[0, 2] == 0
-        with pytest.raises(InvalidInputError, match=r"index of a pose in a graph in SE\(3\)"):
+        with pytest.raises(InvalidInputError, match=r"\(x, y, z\) in a graph in SE\(3\)"):
             predict(graph, [(0, 0), (1, 0)], start=(0, 0))
 
 

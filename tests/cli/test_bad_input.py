@@ -153,13 +153,33 @@ def test_a_file_where_the_folder_should_be_is_noticed_before_the_work(topobelief
     assert (tmp_path / "taken").read_text() == "mine"
 
 
-def test_a_graph_in_space_cannot_be_planned_on_in_the_plane(topobelief, office, tmp_path):
-    poses = np.array([[0, 0, 0, 0, 0, 0, 1], [1, 0, 0, 0, 0, 0, 1]])
+def test_maps_of_the_other_dimension(topobelief, office, tmp_path):
+    """A floor plan for a graph in space, a 3D map for one in the plane."""
+    poses = np.array([[0, 0, 0, 0, 0, 0, 1], [1, 0, 2, 0, 0, 0, 1]])
     write_g2o(PoseGraph(poses, [(0, 1)], None, np.eye(6)), tmp_path / "space.g2o")
-    arguments = ["plan", str(tmp_path / "space.g2o"), "--map", str(office.map_file), "--goal", "0", "5"]
+    np.save(tmp_path / "grid.npy", np.zeros((3, 3, 3)))
+    arguments = ["plan", str(tmp_path / "space.g2o"), "--map", str(office.map_file), "--goal", "0", "5", "0"]
     message = one_line(topobelief(arguments))
-    assert "expected a graph in SE(2) to plan in the plane, got one in SE(3); if it is planar" in message
+    assert "expected a 3D map (.npy, .ply or .pcd) or none for a graph in SE(3)" in message
     assert "pass --planar" in message
+    planar = ["plan", str(office.graph_file), "--goal", "0", "5"]
+    message = one_line(topobelief([*planar, "--map", "grid.npy", "--resolution", "1"]))
+    assert "expected a floor plan (.yaml or .csv) for a graph in SE(2), got the 3D map" in message
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--goal", "0", "5", "1", "--along-trajectory"], "expected --goal as X Y for a graph in SE(2), got 3 numbers"),
+        (["--goal", "0", "5", "--along-trajectory", "--flying"], "expected a graph in SE(3) with --flying or --driving"),
+        (["--goal", "0", "5", "--along-trajectory", "--height", "1"], "expected a graph in SE(3) with --height"),
+        (["--goal", "0", "5", "--along-trajectory", "--resolution", "1"], "expected a 3D map (.npy, .ply or .pcd) with --res"),
+        (["--goal", "0", "5", "--map", "grid.npy", "--origin", "1", "2"], "expected three numbers X Y Z in metres, got '1 2'"),
+        (["--goal", "0", "5", "--map", "grid.npy", "--driving"], "expected no --map with --flying or --driving"),
+    ],
+)
+def test_options_of_space_in_the_plane(topobelief, office, options, message):
+    assert message in one_line(topobelief(["plan", str(office.graph_file), *options]))
 
 
 @pytest.mark.parametrize("arguments", [["fly"], ["plan"], ["info", "a.g2o", "b.g2o"]])

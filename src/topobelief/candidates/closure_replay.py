@@ -11,7 +11,7 @@ from topobelief.candidates.closures import ClosureModel, closures_of_paths
 from topobelief.candidates.learned_closures import History, learn_closures
 from topobelief.errors import InvalidInputError
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.world import World
+from topobelief.world import FreeSpace
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class Replay:
         return self.predicted / self.made if self.made else math.inf if self.predicted else math.nan
 
 
-def replay_closures(graph: PoseGraph, *, hidden: float = 0.2, world: World | None = None) -> Replay:
+def replay_closures(graph: PoseGraph, *, hidden: float = 0.2, world: FreeSpace | None = None) -> Replay:
     """Predict the closures of the last poses of a graph by a model learned from the others.
 
     Parameters

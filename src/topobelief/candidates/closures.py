@@ -22,7 +22,8 @@ from topobelief.arrays import BoolArray, FloatArray, IntArray
 from topobelief.errors import InvalidInputError, degrees_hint
 from topobelief.geometry.group import Group
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.world import World
+from topobelief.world import FreeSpace
+from topobelief.world.space import seen_by
 
 _ROUNDING = 1e-9  # relative: what differs by less counts as equal
 _AT_ONCE = 2048  # places whose pairs are held in memory together
@@ -120,7 +121,7 @@ def closures_with_prior(
     *,
     steps: ArrayLike | int | None = None,
     start: int | None = None,
-    world: World | None = None,
+    world: FreeSpace | None = None,
 ) -> IntArray:
     """Poses of a graph that each of many new poses would close a loop with, if it were the only one.
 
@@ -164,7 +165,7 @@ def closures_with_prior(
 
 
 def closures_among(
-    group: Group, poses: FloatArray, model: ClosureModel, *, left: IntArray | None = None, world: World | None = None
+    group: Group, poses: FloatArray, model: ClosureModel, *, left: IntArray | None = None, world: FreeSpace | None = None
 ) -> IntArray:
     """Closures among poses that are driven one after the other.
 
@@ -196,7 +197,7 @@ def closures_of_paths(
     model: ClosureModel,
     *,
     start: int | None = None,
-    world: World | None = None,
+    world: FreeSpace | None = None,
 ) -> list[IntArray]:
     """Closures of the new poses of each of several paths, driven from one start.
 
@@ -244,7 +245,7 @@ def closing_pairs(
     *,
     chained: BoolArray,
     left: IntArray | None = None,
-    world: World | None = None,
+    world: FreeSpace | None = None,
 ) -> IntArray:
     """Of pairs (row of `new`, row of `old`) those that close a loop: near, aligned, in sight, and not too many; sorted.
 
@@ -268,7 +269,7 @@ def closing_pairs(
     near &= np.linalg.norm(group.rotation_vector(relative), axis=1) <= model.angle * (1 + _ROUNDING)
     i, j, distances = i[near], j[near], distances[near]
     if world is not None:
-        seen = world.visible(new[i, :2], old[j, :2])
+        seen = world.visible(seen_by(world, group.position(new)[i]), seen_by(world, group.position(old)[j]))
         i, j, distances = i[seen], j[seen], distances[seen]
     if model.max_per_pose is not None:
         limit = np.full(len(new), model.max_per_pose) if left is None else left

@@ -20,9 +20,10 @@ from scipy import sparse
 from scipy.sparse.csgraph import dijkstra
 
 from topobelief.arrays import BoolArray, FloatArray, IntArray
-from topobelief.candidates.polyline import distances_to_segments, path_length, stations
+from topobelief.candidates.polyline import path_length, stations
 from topobelief.candidates.roadmap import Roadmap
-from topobelief.world import shapes
+from topobelief.geometry.segments import distances_to_segments
+from topobelief.world.segment_index import SegmentIndex
 
 _BALLS_PER_PATH = 2  # how often each path of the queue is varied
 _FIRST_LIMIT = 0.02  # of the shortest path: by how much a search first lets the excess grow
@@ -35,19 +36,19 @@ _dijkstra = cast("Any", dijkstra)  # whose stub refuses one index
 class Balls:
     """Balls that a path avoids."""
 
-    centres: FloatArray  # shape (B, 2)
+    centres: FloatArray  # shape (B, dim)
     radii: FloatArray  # shape (B,)
 
     @classmethod
-    def none(cls) -> Balls:
-        return cls(np.zeros((0, 2)), np.zeros(0))
+    def none(cls, dim: int = 2) -> Balls:
+        return cls(np.zeros((0, dim)), np.zeros(0))
 
     def and_one(self, centre: FloatArray, radius: float) -> Balls:
         """These and one more."""
         return Balls(np.vstack([self.centres, centre]), np.append(self.radii, radius))
 
     def clear_of(self, starts: FloatArray, ends: FloatArray) -> BoolArray:
-        """Whether each segment, shapes (N, 2), stays out of all balls."""
+        """Whether each segment, shapes (N, dim), stays out of all balls."""
         apart = distances_to_segments(self.centres[:, None], starts, ends) - self.radii[:, None]
         return apart.min(axis=0, initial=np.inf) > 0
 
@@ -79,7 +80,7 @@ class DetourSearch:
     def __init__(self, roadmap: Roadmap, paths: list[list[int]], max_length: float, *, rng: np.random.Generator) -> None:
         self._vertices = roadmap.vertices
         self._rng = rng
-        self._first = [Detour(path, Balls.none(), np.zeros(0, dtype=np.int64), 0.0) for path in paths]
+        self._first = [Detour(path, Balls.none(roadmap.world.dim), np.zeros(0, dtype=np.int64), 0.0) for path in paths]
         self._queue: deque[Detour] = deque()
         self._num_varied = 0
 
@@ -91,7 +92,7 @@ class DetourSearch:
         through = roadmap.lengths + np.minimum(to_start[a] + to_goal[b], to_start[b] + to_goal[a])
         a, b = roadmap.edges[through <= longest].T  # no path within the length takes any other
         self._starts, self._ends = roadmap.vertices[a], roadmap.vertices[b]
-        self._index = shapes.SegmentIndex(self._starts, self._ends)
+        self._index = SegmentIndex(self._starts, self._ends)
 
         lengths, closer = np.linalg.norm(self._ends - self._starts, axis=1), to_goal[a] - to_goal[b]
         excess = np.maximum(np.concatenate([lengths - closer, lengths + closer]), 0.0)

@@ -21,13 +21,13 @@ class DistinctPaths:
 
     Parameters
     ----------
-    landmarks : shape (L, 2)
+    landmarks : shape (L, dim)
         Anywhere among the paths.
     """
 
     def __init__(self, landmarks: FloatArray) -> None:
         self._landmarks = landmarks
-        self._samples: FloatArray = np.zeros((16, _NUM_SAMPLES, 2))
+        self._samples: FloatArray = np.zeros((16, _NUM_SAMPLES, landmarks.shape[1]))
         self._approaches: FloatArray = np.zeros((len(landmarks), 16))  # distance from each landmark to each path
         self._count = 0
 
@@ -35,7 +35,7 @@ class DistinctPaths:
         return self._count
 
     def add(self, path: FloatArray) -> None:
-        """Add a path, shape (waypoints, 2)."""
+        """Add a path, shape (waypoints, dim)."""
         if self._count == len(self._samples):
             self._samples = np.concatenate([self._samples, np.zeros_like(self._samples)])
             self._approaches = np.concatenate([self._approaches, np.zeros_like(self._approaches)], axis=1)
@@ -64,7 +64,7 @@ def frechet_within(waypoints: FloatArray, others: FloatArray, distance: float) -
 
     Parameters
     ----------
-    waypoints, others : shape (N, 2), shape (M, 2)
+    waypoints, others : shape (N, dim), shape (M, dim)
         M at most 62.
     distance
     """

@@ -2,7 +2,8 @@
 
 First the shortest path of each homotopy class within the detour limit (`homotopy`). Then, to fill up, detours around
 balls (`detours`), as far as they differ from all paths that are there (`distinct_paths`): by the radius of the balls,
-which halves when few more are found.
+which halves when few more are found. In space the classes are left out: there the sides of an obstacle that floats are one
+class, and what remains of diversity is the distance between paths (Voss, Moll and Kavraki, ICRA 2015).
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ def diverse_paths(
     ----------
     roadmap
     start, goal : shape (2,) or (3,)
-        Metres; a heading is ignored. Places that the roadmap was not built for are joined to it.
+        Metres; in the plane a heading is ignored. Places that the roadmap was not built for are joined to it.
     num_paths
         How many at most; fewer where the roadmap has no more that differ by 1/16 of the ball radius.
     max_detour
@@ -61,7 +62,7 @@ def diverse_paths(
 
     Returns
     -------
-    list of arrays, shape (waypoints, 2)
+    list of arrays, shape (waypoints, dim)
         From start to goal, metres; the straight way between two waypoints is free for the roadmap's robot. Corners
         are cut where that leaves the path in its class, and clear of the balls that it avoids.
 
@@ -91,7 +92,11 @@ def diverse_paths(
     )  # the shortest path is never too long
     rays = Rays.of_obstacles(roadmap, min_size=radius, max_length=max_length, max_rays=max_rays)
     straightening = Straightening(roadmap, rays)
-    classes = shortest_paths_by_class(roadmap, rays, num_classes=num_paths, max_length=max_length)
+    classes = (
+        [shortest]
+        if roadmap.region is None
+        else shortest_paths_by_class(roadmap, rays, num_classes=num_paths, max_length=max_length)
+    )
     selection = _Selection(roadmap, straightening, num_paths, max_detour, _landmarks(roadmap, max_length))
     for path in classes:
         selection.add(straightening.by_pieces(roadmap.vertices[straightening.by_vertices(path)]))

@@ -20,7 +20,7 @@ import numpy as np
 from topobelief.arrays import BoolArray, FloatArray
 from topobelief.candidates.polyline import path_length
 from topobelief.candidates.roadmap import Roadmap
-from topobelief.world import shapes
+from topobelief.world import World, shapes
 
 Point = tuple[float, float]
 Word = tuple[int, ...]  # letters ±1 … ±num_rays
@@ -56,14 +56,18 @@ class Rays:
         Which side of a speck a path takes does not matter, and a map has many from noise and the legs of furniture. So
         without `specks` a hole counts only if it holds an obstacle of at least the robot's radius, corner to corner, or
         smaller ones that the robot cannot pass between, over more than twice its diameter (a fence, say).
+
+        In space there are none: a path can be moved over an obstacle that floats.
         """
+        if roadmap.region is None or not isinstance(roadmap.world, World):
+            return cls(np.zeros((0, 2)))
         start, goal = roadmap.vertices[:2]
         holes = shapes.holes(roadmap.region)
         size, points = shapes.sizes(holes), shapes.points_within(holes)
         detour = np.linalg.norm(points - start, axis=1) + np.linalg.norm(points - goal, axis=1)
         worth_it = (size >= min_size) & (detour <= max_length)
         if not specks:
-            worth_it &= _matters(roadmap, holes)
+            worth_it &= _matters(roadmap.world, roadmap.robot_radius, holes)
         largest_first = np.argsort(-size, kind="stable")
         return cls(points[largest_first[worth_it[largest_first]][:max_rays]])
 
@@ -73,6 +77,8 @@ class Rays:
         A point straight above an origin counts as right of it, and rays that coincide as infinitesimally apart, the
         earlier one to the left, so that no way through a vertex of the roadmap is counted twice or not at all.
         """
+        if not len(self.origins):
+            return [Word()] * len(starts)
         x, y = self.origins.T
         left, right = starts[:, :1] < x, ends[:, :1] < x  # which ends lie left of which ray, shape (N, R)
         segment, ray = np.nonzero(left != right)
@@ -244,10 +250,9 @@ class _Trail:
         return False
 
 
-def _matters(roadmap: Roadmap, holes: shapes.ShapeArray) -> BoolArray:
+def _matters(world: World, radius: float, holes: shapes.ShapeArray) -> BoolArray:
     """Which holes in the reachable region are more than specks, see `Rays.of_obstacles`; shape (N,)."""
-    radius = roadmap.robot_radius
-    solid = shapes.largest_within(holes, shapes.holes(roadmap.world.free))
+    solid = shapes.largest_within(holes, shapes.holes(world.free))
     x_min, y_min, x_max, y_max = (shapes.extents(holes) + radius * np.array([1, 1, -1, -1])).T  # of what is in the hole
     spread = np.hypot(np.maximum(x_max - x_min, 0.0), np.maximum(y_max - y_min, 0.0))
     return (solid >= radius) | (spread > 2 * (2 * radius))

@@ -16,7 +16,7 @@ from topobelief.arrays import FloatArray, IntArray
 from topobelief.candidates.closures import ClosureModel, closing_pairs, odometry_links
 from topobelief.errors import InvalidInputError
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.world import World
+from topobelief.world import FreeSpace
 
 _REACH = 0.9  # share of the closures whose distance and angle the rule covers
 _LEAST_ANGLE = math.radians(15)
@@ -28,7 +28,7 @@ _AT_ONCE = 2048  # poses whose pairs are held in memory together
 
 
 def learn_closures(
-    graph: PoseGraph, *, world: World | None = None, probability: float = 0.5, rule: ClosureModel | None = None
+    graph: PoseGraph, *, world: FreeSpace | None = None, probability: float = 0.5, rule: ClosureModel | None = None
 ) -> ClosureModel:
     """The closures that a graph's own front end makes, as a model of those to come.
 
@@ -85,7 +85,7 @@ def learn_closures(
 
 
 def _with_probability(
-    graph: PoseGraph, model: ClosureModel, made: int, world: World | None, *, mean: float, weight: float
+    graph: PoseGraph, model: ClosureModel, made: int, world: FreeSpace | None, *, mean: float, weight: float
 ) -> ClosureModel:
     """The model with the mean of the beta distribution that one of a mean, worth so many opportunities, becomes."""
     opportunities = num_opportunities(graph, model, world=world)
@@ -153,7 +153,7 @@ def _usual_gap(apart: IntArray, distances: FloatArray, step: float) -> int:
     return gap
 
 
-def num_opportunities(graph: PoseGraph, model: ClosureModel, *, world: World | None = None) -> int:
+def num_opportunities(graph: PoseGraph, model: ClosureModel, *, world: FreeSpace | None = None) -> int:
     """How many closures a model's rule would have predicted for all poses of a graph, each new to those before it."""
     tree, chained, total = KDTree(graph.positions), odometry_links(graph), 0
     for first in range(0, graph.num_poses, _AT_ONCE):

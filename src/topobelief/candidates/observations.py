@@ -19,7 +19,8 @@ from topobelief.errors import InvalidInputError, degrees_hint
 from topobelief.graph.information import scalar_weights
 from topobelief.graph.observations import seen_positions
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.world import World
+from topobelief.world import FreeSpace
+from topobelief.world.space import seen_by
 
 _REACH = 0.9  # share of the observations whose distance and bearing the rule covers
 _LEAST_HALF_ANGLE = math.radians(15)
@@ -96,7 +97,7 @@ class ObservationModel:
         return f"landmarks: {number} within {self.max_range:.3g} m{view}{chance}, {self.sigma:.3g} m{learned}"
 
 
-def learn_observations(graph: PoseGraph, *, world: World | None = None) -> ObservationModel | None:
+def learn_observations(graph: PoseGraph, *, world: FreeSpace | None = None) -> ObservationModel | None:
     """The observations that a graph's own front end made, as a model of those to come; None where there are none.
 
     `max_range` is the 90 % quantile of the distances from which landmarks were observed, `field_of_view` twice that of their
@@ -137,7 +138,9 @@ def learn_observations(graph: PoseGraph, *, world: World | None = None) -> Obser
     )
 
 
-def observations_from(graph: PoseGraph, poses: FloatArray, model: ObservationModel, *, world: World | None = None) -> IntArray:
+def observations_from(
+    graph: PoseGraph, poses: FloatArray, model: ObservationModel, *, world: FreeSpace | None = None
+) -> IntArray:
     """Landmarks of a graph that each of many poses would observe.
 
     Parameters
@@ -164,7 +167,9 @@ def observations_from(graph: PoseGraph, poses: FloatArray, model: ObservationMod
         row, landmark, distance = near["i"].astype(np.int64), landmarks[near["j"]], near["v"]
         kept = _in_view(graph, part[row], landmark, model)
         if world is not None:
-            kept[kept] = world.visible(part[row[kept], :2], graph.positions[landmark[kept], :2])
+            kept[kept] = world.visible(
+                seen_by(world, graph.group.position(part[row[kept]])), seen_by(world, graph.positions[landmark[kept]])
+            )
         row, landmark, distance = row[kept], landmark[kept], distance[kept]
         order = np.lexsort([landmark, distance, row])
         row, landmark = row[order], landmark[order]

@@ -1,4 +1,7 @@
-"""Paths as polylines: arrays of shape (waypoints, 2), metres; how long they are and what lies where along them."""
+"""Paths as polylines: arrays of shape (waypoints, dim), metres, in the plane or in space.
+
+How long they are, and what lies where along them.
+"""
 
 from __future__ import annotations
 
@@ -10,15 +13,14 @@ from numpy.typing import ArrayLike
 from topobelief.arrays import FloatArray, frozen_floats
 from topobelief.errors import InvalidInputError
 from topobelief.geometry.planar import travel_headings
-
-_TINY = np.finfo(float).tiny
+from topobelief.geometry.segments import products
 
 
 class Stations(NamedTuple):
     """Places along a path."""
 
-    positions: FloatArray  # shape (N, 2)
-    headings: FloatArray  # direction of travel, radians, shape (N,)
+    positions: FloatArray  # shape (N, dim)
+    headings: FloatArray  # direction of travel, seen from above, radians, shape (N,)
 
 
 def checked_path(path: ArrayLike, *, name: str = "path") -> FloatArray:
@@ -27,16 +29,18 @@ def checked_path(path: ArrayLike, *, name: str = "path") -> FloatArray:
     Raises
     ------
     InvalidInputError
-        Where it is not an array of finite waypoints of shape (waypoints, 2), at least one.
+        Where it is not an array of finite waypoints of shape (waypoints, 2) or (waypoints, 3), at least one.
     """
     array = frozen_floats(path, name=name)
-    if array.ndim != 2 or array.shape[1] != 2 or len(array) == 0 or not np.isfinite(array).all():
-        raise InvalidInputError(f"expected {name} as finite waypoints of shape (waypoints, 2), got {array.shape}")
+    if array.ndim != 2 or array.shape[1] not in (2, 3) or len(array) == 0 or not np.isfinite(array).all():
+        raise InvalidInputError(
+            f"expected {name} as finite waypoints of shape (waypoints, 2) or (waypoints, 3), got {array.shape}"
+        )
     return array[np.r_[True, (np.diff(array, axis=0) != 0).any(axis=1)]]
 
 
 def path_length(path: ArrayLike) -> float:
-    """Length of a polyline of shape (waypoints, 2), metres.
+    """Length of a polyline of shape (waypoints, 2) or (waypoints, 3), metres.
 
     Examples
     --------
@@ -86,11 +90,26 @@ def path_poses(path: ArrayLike) -> FloatArray:
 
 
 def sampled(path: FloatArray, count: int) -> FloatArray:
-    """Places at equal distances along a path, its ends among them; shape (count, 2)."""
+    """Places at equal distances along a path, its ends among them; shape (count, dim)."""
     so_far = _lengths_so_far(path)
     at = so_far[-1] * (np.arange(count) / (count - 1))
-    result = np.empty((count, 2))
-    result[:, 0], result[:, 1] = np.interp(at, so_far, path[:, 0]), np.interp(at, so_far, path[:, 1])
+    return interpolated(path, so_far, at)
+
+
+def interpolated(path: FloatArray, so_far: FloatArray, at: FloatArray) -> FloatArray:
+    """Places along a path, shape (N, dim).
+
+    Parameters
+    ----------
+    path : shape (waypoints, dim)
+    so_far : shape (waypoints,)
+        Metres along the path.
+    at : shape (N,)
+        Metres along the path.
+    """
+    result = np.empty((len(at), path.shape[1]))
+    for axis in range(path.shape[1]):
+        result[:, axis] = np.interp(at, so_far, path[:, axis])
     return result
 
 
@@ -98,22 +117,9 @@ def subdivided(path: FloatArray, pieces: int) -> FloatArray:
     """A path with each leg cut into equal pieces; its own waypoints stay as they are, every `pieces`-th of the result."""
     shares = (np.arange(pieces) / pieces)[:, None]
     legs = path[:-1, None] + shares * (path[1:] - path[:-1])[:, None]
-    return np.vstack([legs.reshape(-1, 2), path[-1:]])
-
-
-def distances_to_segments(points: FloatArray, starts: FloatArray, ends: FloatArray) -> FloatArray:
-    """Distance of points to segments, metres; shapes (…, 2), which are broadcast, to (…)."""
-    along, to_point = ends - starts, points - starts
-    share = _dot(to_point, along) / np.maximum(_dot(along, along), _TINY)
-    apart = to_point - np.clip(share, 0.0, 1.0)[..., None] * along
-    return np.sqrt(_dot(apart, apart))
-
-
-def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Products of vectors of two components, shapes (…, 2), broadcast; several times faster than a sum over the last axis."""
-    return a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1]
+    return np.vstack([legs.reshape(-1, path.shape[1]), path[-1:]])
 
 
 def _lengths_so_far(path: FloatArray) -> FloatArray:
     leg = path[1:] - path[:-1]
-    return np.concatenate([[0.0], np.cumsum(np.sqrt(_dot(leg, leg)))])
+    return np.concatenate([[0.0], np.cumsum(np.sqrt(products(leg, leg)))])

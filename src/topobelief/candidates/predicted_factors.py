@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from topobelief.arrays import FloatArray, IntArray
+from topobelief.candidates.attitude import Attitude, Legs, lifted
 from topobelief.candidates.closures import ClosureModel, closures_of_paths
 from topobelief.candidates.learned_closures import History, learn_closures
 from topobelief.candidates.new_poses import poses_along
@@ -24,7 +25,8 @@ from topobelief.errors import InvalidInputError, PlanningError
 from topobelief.graph.action import Action
 from topobelief.graph.information import shared_information
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.world import World
+from topobelief.world import FreeSpace
+from topobelief.world.space import require_room_for, seen_by
 
 _ROUNDING = 1e-9  # relative: what differs by less counts as equal
 _FEW = 10  # closures, of which a median says little
@@ -44,17 +46,19 @@ def predict_actions(
     closure_radius: float | None = None,
     closure_angle: float | None = None,
     min_index_gap: int | None = None,
-    world: World | None = None,
+    world: FreeSpace | None = None,
     start: int | ArrayLike | Start | None = None,
+    attitude: Attitude | None = None,
 ) -> list[Action]:
     """One action a path, for a robot that stands at the graph's last pose unless told otherwise.
 
     Parameters
     ----------
     graph
-        In SE(2), or in SE(3) with z up: there a path is driven upright at the height of the pose where it starts.
+        In SE(2), or in SE(3) with z up.
     paths
-        Each of shape (waypoints, 2), metres. A path that does not begin at the start is led there straight.
+        Each of shape (waypoints, 2), or (waypoints, 3) in SE(3), metres. There a path of the plane is driven at the height of
+        the pose where it starts. A path that does not begin at the start is led there straight.
     closures
         Which loops the new poses close. Default: learned from the graph (`learn_closures`), in the `world` that is given.
     observations
@@ -75,7 +79,11 @@ def predict_actions(
     start
         Where the robot stands: index of a pose, to which the first new pose is joined, or a place (x, y). From a place the
         nearest pose in sight is taken, as if the robot had come straight from there: new poses begin on that way, which does
-        not count as length. Default: the last pose.
+        not count as length. Default: the last pose. In SE(3) a place has its height (x, y, z).
+    attitude
+        Of new poses in SE(3), which all head along the path: "upright", level; or "along", with the x axis along the path and
+        the z axis as the pose of the graph next to it has it. Default: upright where the paths are planar, or all poses of the
+        graph are within 30 degrees of it; else along.
 
     Returns
     -------
@@ -106,14 +114,22 @@ def predict_actions(
     else:
         of_odometry = of_closures = np.asarray(information, dtype=np.float64)
     seeing = learn_observations(graph, world=world) if observations is None else observations
+    if world is not None:
+        require_room_for(graph, world)
     begin = find_start(graph, start, world=world)
     ways: list[_Way] = []
+    dim = 2
     for index, path in enumerate(paths):
         name = f"path {index}"
-        ways.append(_way(graph, begin, checked_path(path, name=name), tolerance=_ROUNDING * spacing))
+        checked = checked_path(path, name=name)
+        if checked.shape[1] > graph.group.position_dim:
+            raise InvalidInputError(f"expected {name} in the plane for a graph in {graph.group.name}, got one in space")
+        dim = max(dim, checked.shape[1])
+        ways.append(_way(graph, begin, lifted(checked, graph, begin.pose), tolerance=_ROUNDING * spacing))
         if world is not None:
             _require_free(world, ways[-1], name)
-    poses = [poses_along(graph, begin.pose, way.full, spacing=spacing, turn=turn) for way in ways]
+    legs = Legs(graph, attitude, dim=dim)
+    poses = [poses_along(graph, begin.pose, way.full, spacing=spacing, turn=turn, legs=legs) for way in ways]
     found = closures_of_paths(graph, poses, model, start=begin.pose, world=world)
     sightings = _observations_of_paths(graph, poses, seeing, world)
     actions: list[Action] = []
@@ -144,7 +160,7 @@ def predict_actions(
 
 
 def _observations_of_paths(
-    graph: PoseGraph, paths: Sequence[FloatArray], model: ObservationModel | None, world: World | None
+    graph: PoseGraph, paths: Sequence[FloatArray], model: ObservationModel | None, world: FreeSpace | None
 ) -> list[IntArray]:
     """New pose, landmark, for the new poses of each path; indices as `Action` has them."""
     if model is None or not paths:
@@ -159,13 +175,20 @@ def _observations_of_paths(
 
 
 def _chosen_model(
-    graph: PoseGraph, closures: ClosureModel | None, by_hand: dict[str, Any], world: World | None
+    graph: PoseGraph, closures: ClosureModel | None, by_hand: dict[str, Any], world: FreeSpace | None
 ) -> ClosureModel:
     if closures is None:
         return ClosureModel.by_hand(**by_hand) if by_hand else learn_closures(graph, world=world)
     if by_hand:
         raise InvalidInputError(f"expected closures or a rule by hand, got both; leave out {' and '.join(by_hand)}")
     return closures
+
+
+def usual_spacing(graph: PoseGraph) -> float:
+    """Metres between new poses that suit a graph: 1 in the plane, in space the median step of its odometry."""
+    if graph.group.position_dim == 2:
+        return 1.0
+    return History.of(graph).step or 1.0
 
 
 def default_information(graph: PoseGraph) -> FloatArray:
@@ -226,7 +249,7 @@ def _typical(chain: FloatArray) -> FloatArray:
 
 
 class _Way(NamedTuple):
-    """Polylines of shape (waypoints, 2), without repeated waypoints, along which new poses stand."""
+    """Polylines of shape (waypoints, k), without repeated waypoints, along which new poses stand."""
 
     full: FloatArray  # from the pose at the start
     driven: FloatArray  # from the place where the robot stands
@@ -236,19 +259,19 @@ class _Way(NamedTuple):
 def _way(graph: PoseGraph, start: Start, path: FloatArray, *, tolerance: float) -> _Way:
     arrived = bool(np.linalg.norm(path[0] - start.place) <= tolerance)
     driven = checked_path(np.vstack([start.place, path[1:] if arrived else path]))
-    full = np.vstack([graph.positions[start.pose, :2], driven]) if start.distance(graph) else driven
+    full = np.vstack([graph.positions[start.pose], driven]) if start.distance(graph) else driven
     return _Way(full, driven, leads_in=not arrived)
 
 
-def _require_free(world: World, way: _Way, name: str) -> None:
+def _require_free(world: FreeSpace, way: _Way, name: str) -> None:
     """Refuse a path that leaves the free space; where it is led to from a pose in a wall, that way is not judged."""
-    path = way.driven
+    path = seen_by(world, way.driven)
     first = int(way.leads_in and not world.contains(path[:1])[0])
     a, b = (path[first:-1], path[first + 1 :]) if len(path) > 1 else (path, path)
     blocked = np.flatnonzero(~world.visible(a, b))
     if blocked.size:
-        (x, y), (u, v) = a[blocked[0]], b[blocked[0]]
+        begin, end = (f"({', '.join(f'{x:.2f}' for x in ends[blocked[0]])})" for ends in (a, b))
         raise PlanningError(
-            f"expected {name} in the free space of the world, got one that leaves it between ({x:.2f}, {y:.2f}) and "
-            f"({u:.2f}, {v:.2f}); change the path, or leave `world` out to predict without walls"
+            f"expected {name} in the free space of the world, got one that leaves it between {begin} and {end}; "
+            "change the path, or leave `world` out to predict without walls"
         )

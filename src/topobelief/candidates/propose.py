@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from topobelief.arrays import FloatArray
+from topobelief.candidates.attitude import Attitude
 from topobelief.candidates.closures import ClosureModel
 from topobelief.candidates.diverse_paths import diverse_paths
 from topobelief.candidates.observations import ObservationModel
@@ -24,7 +25,7 @@ from topobelief.candidates.start import Start
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.wording import counted
-from topobelief.world import World
+from topobelief.world import FreeSpace
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -53,8 +54,10 @@ class CandidateRule:
         Which landmarks the new poses observe; None: as learned from the graph.
     line_of_sight
         Whether loops close only between poses that see each other, and paths must stay in free space.
-    information : shape (3, 3), or None
+    information : shape (kappa, kappa), or None
         Of every predicted factor; None for what the graph suggests (`predicted_factors.default_information`).
+    attitude
+        Of new poses in SE(3): "upright", "along" the path, or None for what suits the graph, see `predict_actions`.
     """
 
     num_paths: int = 20
@@ -68,6 +71,7 @@ class CandidateRule:
     observations: ObservationModel | None = None
     line_of_sight: bool = True
     information: FloatArray | None = None
+    attitude: Attitude | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -79,7 +83,7 @@ class Routes:
     roadmap
         On which the paths were found.
     paths
-        K polylines, each of shape (waypoints, 2), metres, shortest first.
+        K polylines, each of shape (waypoints, dim) of the world, metres, shortest first.
     """
 
     roadmap: Roadmap
@@ -113,7 +117,7 @@ class Candidates:
 
     @property
     def paths(self) -> list[FloatArray]:
-        """K polylines, each of shape (waypoints, 2), metres, shortest first."""
+        """K polylines, each of shape (waypoints, dim) of the world, metres, shortest first."""
         return self.routes.paths
 
     @property
@@ -129,14 +133,14 @@ def _described(lengths: FloatArray) -> str:
     return f"{counted(len(lengths), 'path')}{extent}"
 
 
-def propose(graph: PoseGraph, world: World, start: ArrayLike | Start, goal: ArrayLike, rule: CandidateRule) -> Candidates:
+def propose(graph: PoseGraph, world: FreeSpace, start: ArrayLike | Start, goal: ArrayLike, rule: CandidateRule) -> Candidates:
     """Diverse paths from a start to a goal, and the factors that each would add.
 
     Parameters
     ----------
     graph
-        In SE(2).
     world
+        In the plane, or for a graph in SE(3) in space.
     start
         Where paths begin. From a `Start`, factors join its pose, as `predict_actions` says. From a place of shape (2,) or (3,),
         metres, they join the graph's last pose, from which a robot is led straight to where paths begin.
@@ -155,7 +159,7 @@ def propose(graph: PoseGraph, world: World, start: ArrayLike | Start, goal: Arra
     return predict_candidates(graph, world, routes, rule, start=start if isinstance(start, Start) else None)
 
 
-def find_routes(world: World, start: ArrayLike | Start, goal: ArrayLike, rule: CandidateRule) -> Routes:
+def find_routes(world: FreeSpace, start: ArrayLike | Start, goal: ArrayLike, rule: CandidateRule) -> Routes:
     """The paths of `propose`, which depend on the world alone."""
     place = start.place if isinstance(start, Start) else start
     roadmap = build_roadmap(world, place, goal, rule.num_vertices, rule.robot_radius, rule.seed)
@@ -163,14 +167,14 @@ def find_routes(world: World, start: ArrayLike | Start, goal: ArrayLike, rule: C
 
 
 def predict_candidates(
-    graph: PoseGraph, world: World, routes: Routes, rule: CandidateRule, *, start: Start | None = None
+    graph: PoseGraph, world: FreeSpace, routes: Routes, rule: CandidateRule, *, start: Start | None = None
 ) -> Candidates:
     """The factors of `propose` along paths that were found before; they join the last pose unless there is a start."""
     return Candidates(routes, predict_along(graph, world, routes.paths, rule, start=start))
 
 
 def predict_along(
-    graph: PoseGraph, world: World, paths: Sequence[ArrayLike], rule: CandidateRule, *, start: Start | None = None
+    graph: PoseGraph, world: FreeSpace, paths: Sequence[ArrayLike], rule: CandidateRule, *, start: Start | None = None
 ) -> list[Action]:
     """As `predict_candidates`, along paths of any origin, each of shape (waypoints, 2)."""
     return predict_actions(
@@ -183,4 +187,5 @@ def predict_along(
         observations=rule.observations,
         world=world if rule.line_of_sight else None,
         start=start,
+        attitude=rule.attitude,
     )

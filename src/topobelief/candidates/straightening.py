@@ -18,8 +18,6 @@ _VERTICES_AHEAD = 32  # to which a cut corner leads at most
 _PIECES = 4  # of each leg of a path, between which corners are cut
 _PIECES_AHEAD = 3 * _PIECES  # three legs; the fourth adds hardly anything
 
-_NO_BALLS = Balls.none()
-
 
 class Straightening:
     """Cuts the corners of paths on a roadmap.
@@ -36,10 +34,11 @@ class Straightening:
 
     def __init__(self, roadmap: Roadmap, rays: Rays) -> None:
         self._roadmap = roadmap
+        self._no_balls = Balls.none(roadmap.world.dim)
         self._rays = rays
         self._known: dict[int, tuple[bool, Word]] = {}  # of two vertices: whether the way between is free, what it spells
 
-    def by_vertices(self, path: Sequence[int], balls: Balls = _NO_BALLS) -> list[int]:
+    def by_vertices(self, path: Sequence[int], balls: Balls | None = None) -> list[int]:
         """The shortest path through some of the vertices of a path.
 
         Parameters
@@ -54,17 +53,17 @@ class Straightening:
         known = self._known_between(vertices[first], vertices[last])
         own = last - first == 1
         allowed = own | np.array([free for free, _ in known])
-        allowed[allowed] &= own[allowed] | balls.clear_of(places[first[allowed]], places[last[allowed]])
+        allowed[allowed] &= own[allowed] | (balls or self._no_balls).clear_of(places[first[allowed]], places[last[allowed]])
         chosen = np.flatnonzero(allowed)
         letters = [known[pair][1] for pair in chosen.tolist()]
         return [path[place] for place in _shortest(places, first[chosen], last[chosen], letters)]
 
-    def by_pieces(self, path: FloatArray, balls: Balls = _NO_BALLS) -> FloatArray:
-        """The shortest path through some of the ends of equal pieces of a path's legs; shapes (waypoints, 2).
+    def by_pieces(self, path: FloatArray, balls: Balls | None = None) -> FloatArray:
+        """The shortest path through some of the ends of equal pieces of a path's legs; shapes (waypoints, dim).
 
         Parameters
         ----------
-        path : shape (waypoints, 2)
+        path : shape (waypoints, dim)
             Free, clear of the balls.
         balls
         """
@@ -72,7 +71,7 @@ class Straightening:
         first, last = _pairs(len(places), _PIECES_AHEAD)
         a, b = places[first], places[last]
         own = last <= (first // _PIECES + 1) * _PIECES  # on one leg of the path
-        allowed = own | balls.clear_of(a, b)
+        allowed = own | (balls or self._no_balls).clear_of(a, b)
         cuts = allowed & ~own
         allowed[cuts] = self._roadmap.world.segments_free(a[cuts], b[cuts], self._roadmap.robot_radius)
         letters = self._rays.crossings(a[allowed], b[allowed])
@@ -103,7 +102,7 @@ def _shortest(places: FloatArray, first: IntArray, last: IntArray, letters: list
 
     Parameters
     ----------
-    places : shape (N, 2)
+    places : shape (N, dim)
     first, last : shape (P,)
         Between which there is a way; all neighbours among them, sorted.
     letters

@@ -11,7 +11,7 @@ from topobelief.cli.console import Reporter
 from topobelief.cli.plan_options import Closures
 from topobelief.errors import InvalidInputError
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.world import World
+from topobelief.world import FreeSpace
 
 
 def stated_closures(
@@ -47,7 +47,7 @@ def stated_closures(
 
 
 def told_closures(
-    stated: ClosureModel | None, graph: PoseGraph, world: World, reporter: Reporter, *, line_of_sight: bool
+    stated: ClosureModel | None, graph: PoseGraph, world: FreeSpace, reporter: Reporter, *, line_of_sight: bool
 ) -> ClosureModel:
     """The closure model, learned from the graph where none is stated; told in one line."""
     model = stated if stated is not None else learn_closures(graph, world=world if line_of_sight else None)
@@ -55,7 +55,9 @@ def told_closures(
     return model
 
 
-def told_observations(graph: PoseGraph, world: World, reporter: Reporter, *, line_of_sight: bool) -> ObservationModel | None:
+def told_observations(
+    graph: PoseGraph, world: FreeSpace, reporter: Reporter, *, line_of_sight: bool
+) -> ObservationModel | None:
     """How landmarks are observed, learned from the graph and told in one line; None where it has none."""
     model = learn_observations(graph, world=world if line_of_sight else None)
     if model is not None:

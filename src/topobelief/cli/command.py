@@ -1,4 +1,4 @@
-"""How a command line is read: no option is silently dropped, places take one value or two, and errors name options."""
+"""How a command line is read: no option is silently dropped, places take one to three values, and errors name options."""
 
 from __future__ import annotations
 
@@ -37,30 +37,39 @@ class Command(TyperCommand):
 
 
 class PlaceCommand(Command):
-    """A command whose options --start and --goal take one number or two."""
+    """A command whose options --start, --goal and --origin take up to three numbers."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse as usual, two numbers after --start or --goal taken as one value."""
-        return super().parse_args(ctx, _pairs_joined(_pairs_joined(args, "--start"), "--goal"))
+        """Parse as usual, the numbers after such an option taken as one value."""
+        for option in ("--start", "--goal", "--origin"):
+            args = _numbers_joined(args, option)
+        return super().parse_args(ctx, args)
 
 
-def _pairs_joined(args: list[str], option: str) -> list[str]:
-    """Arguments in which the number that follows the value of an option is part of that value.
+def _numbers_joined(args: list[str], option: str) -> list[str]:
+    """Arguments in which the numbers that follow the value of an option, two at most, are part of that value.
 
     Examples
     --------
-    >>> _pairs_joined(["--start", "1", "-2.5", "graph.g2o"], "--start")
+    >>> _numbers_joined(["--start", "1", "-2.5", "graph.g2o"], "--start")
     ['--start', '1 -2.5', 'graph.g2o']
+    >>> _numbers_joined(["--start", "1", "-2.5", "3", "4"], "--start")
+    ['--start', '1 -2.5 3', '4']
     """
     joined: list[str] = []
     for arg in args:
         value = joined[-1].removeprefix(f"{option}=") if joined else ""
         of_option = value != joined[-1] if joined else False
-        if joined and (of_option or joined[-2:-1] == [option]) and _is_number(value) and _is_number(arg):
+        if joined and (of_option or joined[-2:-1] == [option]) and _are_numbers(value) and _is_number(arg):
             joined[-1] += f" {arg}"
         else:
             joined.append(arg)
     return joined
+
+
+def _are_numbers(text: str) -> bool:
+    """One number, or two."""
+    return len(text.split()) in (1, 2) and all(map(_is_number, text.split()))
 
 
 def _is_number(text: str) -> bool:

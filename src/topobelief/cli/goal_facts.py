@@ -7,23 +7,25 @@ from collections.abc import Iterator, Sequence
 from topobelief.cli.graph_facts import Fact
 from topobelief.cli.plan_ends import Goal, shown
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.world import World
+from topobelief.world import FreeSpace
 from topobelief.world.free_places import nearest_free_place
+from topobelief.world.space import seen_by
 
 
-def describe_goals(graph: PoseGraph, world: World, goals: Sequence[Goal], robot_radius: float) -> Iterator[Fact]:
+def describe_goals(graph: PoseGraph, world: FreeSpace, goals: Sequence[Goal], robot_radius: float) -> Iterator[Fact]:
     """A line for each goal; nearest free places are such that the robot can drive there from the last pose."""
     found: list[dict[str, object]] = []
     for goal in goals:
-        clearance = float(world.clearance(goal.place[None])[0])
+        goal_place = seen_by(world, goal.place)
+        clearance = float(world.clearance(goal_place[None])[0])
         free = clearance > robot_radius
         where = "in an obstacle, unknown or off the map" if clearance <= 0 else f"{clearance:.2f} m from the nearest obstacle"
-        text, place = f"free, {where}", goal.place
+        text, place = f"free, {where}", goal_place
         if not free:
-            place = nearest_free_place(world, goal.place, robot_radius, reachable_from=graph.positions[-1, :2])
+            place = nearest_free_place(world, goal_place, robot_radius, reachable_from=seen_by(world, graph.positions[-1]))
             nearest = "there is no free place" if place is None else f"the nearest free place is {place[0]:g} {place[1]:g}"
             text = f"not free for a robot of radius {robot_radius:g} m, {where}; {nearest}"
         nearest_free = None if place is None else place.tolist()
-        found.append({"place": goal.place.tolist(), "free": free, "clearance": clearance, "nearest_free": nearest_free})
+        found.append({"place": goal_place.tolist(), "free": free, "clearance": clearance, "nearest_free": nearest_free})
         yield Fact("", None, goal.name if goal.name != shown(goal.place) else f"goal {goal.name}", text)
     yield Fact("goals", found, "", "")

@@ -83,18 +83,21 @@ def info(
         drop, robust_as_plain=robust_as_plain, edge2_order=edge2_order, component=component, planar=planar, topic=topic
     )
     facts = graph_facts.describe(graph_file, reporter, optimized=optimize, reading=reading)
-    world = None
+    plan = None
     if goal or map_file is not None:
         from topobelief.cli.goal_facts import describe_goals
         from topobelief.cli.plan_ends import choose_goals
-        from topobelief.cli.plan_world import read_world
+        from topobelief.cli.plan_world import WorldChoice, read_world
+        from topobelief.world import World
 
-        world = read_world(map_file, facts.graph, reporter, topic=map_topic)
+        choice = WorldChoice(map_file, along_trajectory=map_file is None, topic=map_topic)
+        world = read_world(choice, facts.graph, reporter)
         goals = choose_goals(facts.graph, goal or ())
+        plan = world if isinstance(world, World) else None
         if goals:
             facts.groups["Goals"] = list(describe_goals(facts.graph, world, goals, robot_radius))
     if picture is not None:
-        graph_picture.write(picture, facts.graph, graph_file.name, world, reporter)
+        graph_picture.write(picture, facts.graph, graph_file.name, plan, reporter)
     reporter.say(*facts.tables())
     if picture is not None:
         reporter.say(f"Picture: {picture}")

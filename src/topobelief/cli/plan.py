@@ -6,6 +6,7 @@ import math
 import warnings
 from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
 import typer
 
@@ -25,6 +26,10 @@ def plan(
     along_trajectory: options.AlongTrajectory = False,
     width: options.Width = None,
     unknown: options.UnknownCells = "occupied",
+    flying: options.Flying = None,
+    height: options.Height = None,
+    resolution: options.Resolution = None,
+    origin: options.Origin = None,
     robot_radius: options.RobotRadius = 0.35,
     path: options.PathFiles = None,
     candidates: options.NumCandidates = None,
@@ -34,7 +39,8 @@ def plan(
     enough: options.Enough = None,
     vertices: options.Vertices = 1000,
     seed: options.Seed = 0,
-    spacing: options.Spacing = 1.0,
+    spacing: options.Spacing = None,
+    attitude: options.AttitudeName = None,
     closures: options.ClosuresName = None,
     closure_radius: options.ClosureRadius = None,
     closure_angle: options.ClosureAngle = None,
@@ -71,15 +77,13 @@ def plan(
 
     Searches a roadmap for the way after which the map is known best, and says how much better any other could be.
     """
-    if (map_file is None) == (not along_trajectory):
-        raise typer.BadParameter("expected one of --map FILE and --along-trajectory.", param_hint="the world")
     mode = plan_mode.choose(context.params)
     from topobelief.cli.console import Reporter
 
     reporter = Reporter(as_json=as_json)
     with reporter.stage("start-up"):
         from topobelief.candidates.closure_rate import rate_warning
-        from topobelief.candidates.predicted_factors import KEY_POSE_TURN
+        from topobelief.candidates.predicted_factors import KEY_POSE_TURN, usual_spacing
         from topobelief.candidates.propose import CandidateRule
         from topobelief.cli import (
             plan_candidates,
@@ -97,6 +101,18 @@ def plan(
         from topobelief.planning.planner import Planner
         from topobelief.planning.registry import default_signature
 
+    choice = plan_world.WorldChoice(
+        map_file,
+        along_trajectory,
+        width,
+        unknown,
+        flying,
+        height,
+        resolution,
+        cast("tuple[float, ...] | None", origin),
+        map_topic,
+    )
+    choice.check()
     folder = plan_files.checked_folder(out if out is not None or as_json else Path("out"))
     path_file = plan_files.checked_path_file(write_path)
     limit = max_detour if max_detour is not None else math.inf if as_paper else 1.3
@@ -110,7 +126,7 @@ def plan(
         num_vertices=vertices,
         robot_radius=robot_radius,
         seed=seed,
-        spacing=spacing,
+        spacing=spacing or 1.0,
         turn=None if as_paper else KEY_POSE_TURN,
         closures=stated_closures(
             closures,
@@ -121,17 +137,28 @@ def plan(
         ),
         line_of_sight=line_of_sight if line_of_sight is not None else not as_paper,
         information=plan_stages.information(sigma_p, sigma_theta),
+        attitude=attitude,
     )
     reading = reading_options(
         drop, robust_as_plain=robust_as_plain, edge2_order=edge2_order, component=component, planar=planar, topic=topic
     )
-    graph = plan_stages.read_graph(graph_file, reporter, optimized=optimize, reading=reading)
-    world = plan_world.read_world(map_file, graph, reporter, width=width, unknown=unknown, topic=map_topic)
+    graph = plan_stages.read_graph(
+        graph_file,
+        reporter,
+        optimized=optimize,
+        reading=reading,
+        accepted=lambda filed: choice.accepted(graph_file, filed, reporter),
+    )
+    world = plan_world.read_world(choice, graph, reporter)
     begin = plan_ends.choose_start(graph, world, reporter, start)
     goals = plan_ends.choose_goals(graph, goal or ())
     model = told_closures(rule.closures, graph, world, reporter, line_of_sight=rule.line_of_sight)
     rule = replace(
-        rule, closures=model, observations=told_observations(graph, world, reporter, line_of_sight=rule.line_of_sight)
+        rule,
+        closures=model,
+        observations=told_observations(graph, world, reporter, line_of_sight=rule.line_of_sight),
+        information=plan_stages.information(sigma_p, sigma_theta, tangent_dim=graph.tangent_dim),
+        spacing=spacing or usual_spacing(graph),
     )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NotOptimizedWarning)  # `read_graph` has told

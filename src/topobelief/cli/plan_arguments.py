@@ -18,26 +18,37 @@ class GivenPlace:
     """Where the robot is or shall be, as given: the id of a pose (12, or a symbol such as x3), or a place in metres."""
 
     pose_id: str | None = None
-    place: tuple[float, float] | None = None
+    place: tuple[float, ...] | None = None
 
     def __str__(self) -> str:
-        return str(self.pose_id) if self.place is None else f"{self.place[0]:g} {self.place[1]:g}"
+        return str(self.pose_id) if self.place is None else " ".join(f"{number:g}" for number in self.place)
 
 
 def place(text: str) -> GivenPlace:
-    """The id of a pose, or two numbers."""
+    """The id of a pose, or two or three numbers."""
     words = text.split()
     try:
         if len(words) == 1:
             if not re.fullmatch(r"-?\d+|[A-Za-z]{1,2}\d+", words[0]):
                 raise ValueError
             return GivenPlace(pose_id=words[0])
-        x, y = map(float, words)
-        if math.isfinite(x) and math.isfinite(y):
-            return GivenPlace(place=(x, y))
+        numbers = tuple(map(float, words))
+        if len(numbers) in (2, 3) and all(map(math.isfinite, numbers)):
+            return GivenPlace(place=numbers)
     except ValueError:
         pass
-    raise typer.BadParameter(f"expected the id of a pose or X Y in metres, got {text!r}.")
+    raise typer.BadParameter(f"expected the id of a pose or X Y in metres, got {text!r}; in 3D give X Y Z.")
+
+
+def corner(text: str) -> tuple[float, ...]:
+    """Three numbers."""
+    try:
+        numbers = tuple(map(float, text.split()))
+    except ValueError:
+        numbers = ()
+    if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
+        raise typer.BadParameter(f"expected three numbers X Y Z in metres, got {text!r}.")
+    return numbers
 
 
 def above_zero(value: float | None) -> float | None:

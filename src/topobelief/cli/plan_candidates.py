@@ -24,7 +24,7 @@ from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.path_formats import read_filed_path
 from topobelief.wording import counted
-from topobelief.world import World
+from topobelief.world import FreeSpace
 
 _ARRIVED = 0.1  # metres; a path from a file that ends within this of a goal leads there
 
@@ -36,7 +36,7 @@ class Proposals:
     Attributes
     ----------
     paths
-        K polylines, each of shape (waypoints, 2), metres.
+        K polylines, each of shape (waypoints, dim), metres.
     actions
         K, what driving each adds to the graph; labelled "path 0" and so on, with the goal where there are several and with
         the file where there is one.
@@ -64,7 +64,7 @@ class _Way:
 
 def find_proposals(
     graph: PoseGraph,
-    world: World,
+    world: FreeSpace,
     begin: Start,
     goals: Sequence[Goal],
     files: Sequence[Path],
@@ -99,7 +99,7 @@ def find_proposals(
 
 
 def find_candidates(
-    graph: PoseGraph, world: World, begin: Start, goal: Goal, rule: CandidateRule, reporter: Reporter
+    graph: PoseGraph, world: FreeSpace, begin: Start, goal: Goal, rule: CandidateRule, reporter: Reporter
 ) -> list[FloatArray]:
     """Diverse paths from the start to a goal."""
     with told_of_poses_outside(graph, world):
@@ -110,18 +110,22 @@ def find_candidates(
 
 def _described(routes: Routes, begin: Start, goal: Goal, rule: CandidateRule) -> str:
     paths, lengths = routes.paths, routes.lengths
-    classes = count_classes(routes.roadmap, paths)
-    at_least = "" if classes.is_exact else "at least "
-    num_classes = at_least + counted(classes.number, "homotopy class", "homotopy classes")
+    if routes.roadmap.region is None:
+        told = "kept apart by their distance"
+    else:
+        classes = count_classes(routes.roadmap, paths)
+        told = ("" if classes.is_exact else "at least ") + counted(classes.number, "homotopy class", "homotopy classes")
     fewer = f" of {rule.num_paths} asked for" if len(paths) < rule.num_paths else ""
     return (
         f"{counted(len(paths), 'path')}{fewer} from {shown(begin.place)} to {goal.name}: "
-        f"{num_classes}, {lengths.min():.1f} to {lengths.max():.1f} m"
+        f"{told}, {lengths.min():.1f} to {lengths.max():.1f} m"
     )
 
 
-def _from_file(world: World, begin: Start, file: Path, goals: Sequence[Goal], robot_radius: float) -> _Way:
+def _from_file(world: FreeSpace, begin: Start, file: Path, goals: Sequence[Goal], robot_radius: float) -> _Way:
     """A path from a file, led to from the start; each of its legs must keep the robot from what is not free."""
+    if world.dim != 2:
+        raise FileError(file, "expected no --path in 3D, got one: candidates of your own are read in the plane; leave it out")
     filed = read_filed_path(file)
     places = filed.poses[:, :2]
     leads_in = bool((places[0] != begin.place).any())
@@ -146,7 +150,7 @@ def _from_file(world: World, begin: Start, file: Path, goals: Sequence[Goal], ro
     return _Way(checked_path(ends), goal, file.name)
 
 
-def _first_blocked(world: World, a: FloatArray, b: FloatArray, robot_radius: float) -> FloatArray:
+def _first_blocked(world: FreeSpace, a: FloatArray, b: FloatArray, robot_radius: float) -> FloatArray:
     """About the first place of a segment where a disc has no room."""
     count = 2 + int(np.linalg.norm(b - a) / (0.1 * robot_radius))
     places = a + np.linspace(0, 1, min(count, 10_000))[:, None] * (b - a)

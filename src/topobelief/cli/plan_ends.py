@@ -14,18 +14,18 @@ from topobelief.cli.plan_arguments import GivenPlace
 from topobelief.errors import InvalidInputError
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.symbols import find_node, node_name
-from topobelief.world import World
+from topobelief.world import FreeSpace
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Goal:
     """A place to go to, and what to call it."""
 
-    place: FloatArray  # shape (2,), metres, world frame
+    place: FloatArray  # shape (k,) of the graph, metres, world frame
     name: str
 
 
-def choose_start(graph: PoseGraph, world: World, reporter: Reporter, given: GivenPlace | None = None) -> Start:
+def choose_start(graph: PoseGraph, world: FreeSpace, reporter: Reporter, given: GivenPlace | None = None) -> Start:
     """The pose with an id, a place, or the last pose; told, and whether the robot may be elsewhere.
 
     Raises
@@ -37,7 +37,7 @@ def choose_start(graph: PoseGraph, world: World, reporter: Reporter, given: Give
     """
     ids: list[int] = graph.ids.tolist()
     if given is not None and given.place is not None:
-        start = find_start(graph, given.place, world=world)
+        start = find_start(graph, _place(graph, given.place, "--start"), world=world)
         nearest = f"{start.distance(graph):.2f} m from pose {node_name(ids[start.pose])}, the nearest in sight"
         reporter.say(f"from {shown(start.place)}, {nearest}")
         return start
@@ -63,20 +63,29 @@ def choose_goals(graph: PoseGraph, given: Sequence[GivenPlace]) -> list[Goal]:
     Raises
     ------
     InvalidInputError
-        Where the graph has no pose of an id, or two goals are one place.
+        Where the graph has no pose of an id, a place has too few or too many numbers, or two goals are one place.
     """
     goals: list[Goal] = []
     for each in given:
         if each.place is None:
-            goals.append(Goal(graph.positions[_index(graph, each, "--goal"), :2], f"pose {each}"))
+            goals.append(Goal(graph.positions[_index(graph, each, "--goal")], f"pose {each}"))
         else:
-            goals.append(Goal(np.array(each.place), shown(each.place)))
+            goals.append(Goal(_place(graph, each.place, "--goal"), shown(each.place)))
         for earlier in goals[:-1]:
             if (earlier.place == goals[-1].place).all():
                 raise InvalidInputError(
                     f"expected different goals, got {earlier.name} and {goals[-1].name}, which are one place"
                 )
     return goals
+
+
+def _place(graph: PoseGraph, place: tuple[float, ...], option: str) -> FloatArray:
+    if len(place) != graph.group.position_dim:
+        axes = "X Y Z" if graph.group.position_dim == 3 else "X Y"
+        raise InvalidInputError(
+            f"expected {option} as {axes} for a graph in {graph.group.name}, got {len(place)} numbers; or name a pose by its id"
+        )
+    return np.array(place)
 
 
 def _index(graph: PoseGraph, given: GivenPlace, option: str) -> int:
@@ -90,4 +99,4 @@ def _index(graph: PoseGraph, given: GivenPlace, option: str) -> int:
 
 def shown(place: Sequence[float] | FloatArray) -> str:
     """A place for a person."""
-    return f"({place[0]:.2f}, {place[1]:.2f})"
+    return f"({', '.join(f'{coordinate:.2f}' for coordinate in place)})"

@@ -13,7 +13,8 @@ from typing import cast
 import numpy as np
 
 from topobelief.arrays import FloatArray
-from topobelief.candidates.polyline import path_length, path_poses
+from topobelief.candidates.attitude import waypoint_poses
+from topobelief.candidates.polyline import path_length
 from topobelief.candidates.propose import CandidateRule
 from topobelief.candidates.start import Start
 from topobelief.cli.console import Reporter
@@ -29,9 +30,10 @@ from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.files import atomic_file
 from topobelief.io.json_values import without_nan
 from topobelief.io.path_formats import path_text, require_path_suffix
+from topobelief.optional import is_installed
 from topobelief.planning.decision import Decision
 from topobelief.version import __version__
-from topobelief.world import World
+from topobelief.world import FreeSpace, World, World3D
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +41,7 @@ class PlanResult:
     """A decision and all that it was made from."""
 
     graph: PoseGraph
-    world: World
+    world: FreeSpace
     start: Start
     goals: Sequence[Goal]
     proposals: Proposals
@@ -111,7 +113,7 @@ def document(result: PlanResult) -> dict[str, object]:
             "index": decision.best,
             "label": decision.name(decision.best),
             "length": path_length(best),
-            "x_y_yaw": path_poses(best).tolist(),
+            "x_y_yaw" if graph.group.position_dim == 2 else "x_y_z_quaternion": _poses(result).tolist(),
         },
         "expected_errors": result.errors.document(),
         **({} if result.searched is None or result.limits is None else {"search": found(result.searched, result.limits)}),
@@ -131,6 +133,11 @@ def document(result: PlanResult) -> dict[str, object]:
     }
 
 
+def _poses(result: PlanResult) -> FloatArray:
+    """The waypoints of the chosen path as poses."""
+    return waypoint_poses(result.graph, result.proposals.paths[result.decision.best], result.rule.attitude)
+
+
 def _plain(value: object) -> object:
     """For JSON: None for no limit, text for paths and places, lists for arrays, fields for models."""
     if isinstance(value, np.ndarray):
@@ -144,7 +151,7 @@ def write(folder: Path | None, path_file: Path | None, result: PlanResult, repor
     """Draw and write what is wanted, all of it or nothing; say where it is and how long all took."""
     writers: dict[str, Callable[[Path], object]] = {}
     if path_file is not None:
-        text = path_text(path_file, path_poses(result.proposals.paths[result.decision.best]))
+        text = path_text(path_file, _poses(result))
         writers[str(path_file.absolute())] = _writer(text)
     if folder is not None:
         writers["decision.json"] = _writer(json.dumps(document(result), indent=2, allow_nan=False) + "\n")
@@ -170,8 +177,9 @@ def _writer(text: str) -> Callable[[Path], object]:
 
 
 def _pictures_told(folder: Path, result: PlanResult) -> str:
-    if result.searched is not None:
-        return f"Picture: {folder / 'paths.png'}"
+    if result.searched is not None or isinstance(result.world, World3D):
+        page = f"; to turn and zoom: {folder / 'paths.html'}" if isinstance(result.world, World3D) and has_page() else ""
+        return f"Picture: {folder / 'paths.png'}{page}"
     return f"Pictures: {folder / 'paths.png'} and {folder / 'bounds.png'}"
 
 
@@ -182,6 +190,10 @@ def _pictures(result: PlanResult) -> dict[str, Callable[[Path], object]]:
     from topobelief.report.paths_figure import draw_paths
     from topobelief.report.search_figure import draw_search
 
+    if isinstance(result.world, World3D):
+        return _pictures_in_space(result, result.world)
+    if not isinstance(result.world, World):
+        return {}
     if result.searched is not None:
         search = draw_search(result.graph, result.world, result.searched.found, start=result.start)
         return {"paths.png": lambda path: save_figure(search, path)}
@@ -197,6 +209,36 @@ def _pictures(result: PlanResult) -> dict[str, Callable[[Path], object]]:
     )
     bounds = draw_bounds(decision, result.entropies)
     return {"paths.png": lambda path: save_figure(paths, path), "bounds.png": lambda path: save_figure(bounds, path)}
+
+
+def _pictures_in_space(result: PlanResult, world: World3D) -> dict[str, Callable[[Path], object]]:
+    """A picture from above and from the side and, where plotly is installed, a page to turn it; of a list the bounds too."""
+    from topobelief.report.bounds_figure import draw_bounds
+    from topobelief.report.canvas import save_figure
+    from topobelief.report.space_figure import draw_space, space_titles
+    from topobelief.report.space_page import space_page
+
+    proposals, decision = result.proposals, result.decision
+    goals = np.array([goal.place for goal in result.goals]).reshape(-1, 3)
+    title, subtitle = space_titles(decision, None if result.searched is None else result.searched.found)
+    scene = (result.graph, world, proposals.paths, proposals.actions[decision.best], decision.best)
+    figure = draw_space(*scene, title, subtitle, goals=goals, start=result.start)
+    writers: dict[str, Callable[[Path], object]] = {"paths.png": lambda path: save_figure(figure, path)}
+    if has_page():
+        names = [
+            f"{action.label}, {path_length(path):.1f} m"
+            for action, path in zip(proposals.actions, proposals.paths, strict=True)
+        ]
+        writers["paths.html"] = _writer(space_page(*scene, names, title, subtitle, goals=goals, start=result.start))
+    if result.searched is None:
+        bounds = draw_bounds(decision, result.entropies)
+        writers["bounds.png"] = lambda path: save_figure(bounds, path)
+    return writers
+
+
+def has_page() -> bool:
+    """Whether interactive pages can be made."""
+    return is_installed("plotly")
 
 
 def write_together(folder: Path, writers: Mapping[str, Callable[[Path], object]]) -> None:

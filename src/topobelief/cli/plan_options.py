@@ -17,6 +17,7 @@ Determinant = Literal["cholesky", "hadamard"]
 Proof = Literal["none", "bounded", "optimal"]
 Unknown = Literal["occupied", "free"]
 Closures = Literal["learned", "paper", "by-hand"]
+Attitude = Literal["upright", "along"]
 
 _WORLD = "Where the robot may drive"
 _SEARCH = "Search of the roadmap"
@@ -33,18 +34,18 @@ Goals = Annotated[
     list[GivenPlace] | None,
     typer.Option(
         "--goal",
-        metavar="ID | X Y",
+        metavar="ID | X Y [Z]",
         parser=values.place,
-        help="Where to go: id of a pose, or X Y in metres. Repeat it to compare several goals.",
+        help="Where to go: id of a pose, or X Y (in 3D X Y Z) in metres. Repeat it to compare several goals.",
         show_default=False,
     ),
 ]
 Start = Annotated[
     GivenPlace | None,
     typer.Option(
-        metavar="ID | X Y",
+        metavar="ID | X Y [Z]",
         parser=values.place,
-        help="Where the robot starts: id of a pose, or X Y in metres.",
+        help="Where the robot starts: id of a pose, or X Y (in 3D X Y Z) in metres.",
         show_default="the last pose",
     ),
 ]
@@ -53,7 +54,13 @@ Optimize = Annotated[
 ]
 
 MapFile = Annotated[
-    Path | None, typer.Option("--map", metavar="FILE", help="ROS map (.yaml), walls (.csv), or a bag.", rich_help_panel=_WORLD)
+    Path | None,
+    typer.Option(
+        "--map",
+        metavar="FILE",
+        help="ROS map (.yaml), walls (.csv), or a bag; in 3D a grid (.npy) or point cloud (.ply, .pcd).",
+        rich_help_panel=_WORLD,
+    ),
 ]
 MapTopic = Annotated[
     str | None,
@@ -69,7 +76,7 @@ AlongTrajectory = Annotated[
     typer.Option(
         "--along-trajectory",
         metavar="",
-        help="Use no map: where the robot has been counts as free.",
+        help="Use no map: where the robot has been counts as free. In 3D that is so without a map.",
         rich_help_panel=_WORLD,
     ),
 ]
@@ -86,6 +93,46 @@ Width = Annotated[
 UnknownCells = Annotated[
     Unknown,
     typer.Option(metavar="WHAT", help="Treat unknown cells of a ROS map as occupied or free.", rich_help_panel=_WORLD),
+]
+Flying = Annotated[
+    bool | None,
+    typer.Option(
+        "--flying/--driving",
+        metavar="",
+        help="In 3D without a map: whether the robot flies near its trajectory, or drives on the surface that this spans.",
+        show_default="driving if all poses are upright",
+        rich_help_panel=_WORLD,
+    ),
+]
+Height = Annotated[
+    float | None,
+    typer.Option(
+        metavar="M",
+        help="… free height above and below the trajectory, metres.",
+        show_default="1 if it drives, else the width",
+        callback=values.above_zero,
+        rich_help_panel=_WORLD,
+    ),
+]
+Resolution = Annotated[
+    float | None,
+    typer.Option(
+        metavar="M",
+        help="Side of a cell of a 3D map, metres.",
+        show_default="0.2 for point clouds",
+        callback=values.above_zero,
+        rich_help_panel=_WORLD,
+    ),
+]
+Origin = Annotated[
+    object | None,
+    typer.Option(
+        metavar="X Y Z",
+        parser=values.corner,
+        help="Lowest corner of a grid in .npy, metres.",
+        show_default="0 0 0",
+        rich_help_panel=_WORLD,
+    ),
 ]
 RobotRadius = Annotated[float, typer.Option(metavar="M", help="Metres.", callback=values.above_zero, rich_help_panel=_WORLD)]
 
@@ -152,7 +199,14 @@ Seed = Annotated[
 ]
 
 Spacing = Annotated[
-    float, typer.Option(metavar="M", help="Metres between new poses.", callback=values.above_zero, rich_help_panel=_FACTORS)
+    float | None,
+    typer.Option(
+        metavar="M",
+        help="Metres between new poses.",
+        show_default="1; in 3D the graph's median step",
+        callback=values.above_zero,
+        rich_help_panel=_FACTORS,
+    ),
 ]
 ClosuresName = Annotated[
     Closures | None,
@@ -201,6 +255,16 @@ LineOfSight = Annotated[
         metavar="",
         help="Close loops only with poses in line of sight.",
         show_default="yes",
+        rich_help_panel=_FACTORS,
+    ),
+]
+AttitudeName = Annotated[
+    Attitude | None,
+    typer.Option(
+        "--attitude",
+        metavar="NAME",
+        help="Of new poses in 3D, which head along the path: upright, or along it with its slope and roll.",
+        show_default="upright if all poses are",
         rich_help_panel=_FACTORS,
     ),
 ]

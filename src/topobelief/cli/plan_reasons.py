@@ -153,7 +153,7 @@ def details(
             )
         except IllConditionedError:
             pass
-    driven = np.cumsum(np.linalg.norm(np.diff(np.vstack([start.place, action.poses[:, :2]]), axis=0), axis=1))
+    driven = np.cumsum(np.linalg.norm(np.diff(np.vstack([start.place, graph.group.position(action.poses)]), axis=0), axis=1))
     for stretch in seen_again(graph, start.pose, action):
         poses = f"pose{'s' if stretch.last > stretch.first else ''} {stretch.name(graph)}"
         closures = closures_in_words(stretch.num_closures, stretch.expected)

@@ -26,7 +26,7 @@ from topobelief.planning.decision import Decision
 from topobelief.planning.planner import Planner
 from topobelief.search.anytime import SearchProgress
 from topobelief.search.result import SearchResult, Way, said
-from topobelief.world import World
+from topobelief.world import FreeSpace
 
 POINTS_TOLD = 5
 """Of the front."""
@@ -104,7 +104,7 @@ class _Listed:
 
 def search(
     graph: PoseGraph,
-    world: World,
+    world: FreeSpace,
     begin: Start,
     goals: Sequence[Goal],
     rule: CandidateRule,
@@ -158,7 +158,7 @@ def gathered(results: Sequence[SearchResult], goals: Sequence[Goal], *, points: 
 
 def _search_one(
     graph: PoseGraph,
-    world: World,
+    world: FreeSpace,
     begin: Start,
     goal: Goal | None,
     rule: CandidateRule,
@@ -193,6 +193,7 @@ def _search_one(
             information=rule.information,
             start=begin,
             refine=True,
+            attitude=rule.attitude,
             seed=rule.seed,
             on_progress=lambda progress: update(progress_told(progress, objective)),
         )

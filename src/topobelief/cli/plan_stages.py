@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from time import monotonic
 
@@ -12,7 +12,7 @@ from topobelief.arrays import FloatArray
 from topobelief.candidates.propose import CandidateRule
 from topobelief.cli.console import Reporter
 from topobelief.cli.prior import read_prior
-from topobelief.errors import FileError, InvalidInputError, TopobeliefError
+from topobelief.errors import InvalidInputError, TopobeliefError
 from topobelief.graph.action import Action
 from topobelief.graph.fit import misfit
 from topobelief.graph.information import block_isotropic
@@ -32,8 +32,8 @@ _LENGTH_BIAS = 0.9  # rank correlation with the number of poses above which the 
 _FEWEST_TO_JUDGE = 6  # candidates
 
 
-def information(sigma_p: float | None, sigma_theta: float | None) -> FloatArray | None:
-    """Information matrix in SE(2) of independent noise; None where none is given.
+def information(sigma_p: float | None, sigma_theta: float | None, *, tangent_dim: int = 3) -> FloatArray | None:
+    """Information matrix of independent noise; None where none is given.
 
     Raises
     ------
@@ -44,22 +44,31 @@ def information(sigma_p: float | None, sigma_theta: float | None) -> FloatArray 
         return None
     if sigma_p is None or sigma_theta is None:
         raise InvalidInputError("expected both --sigma-p and --sigma-theta or neither, got one; give both")
-    return block_isotropic(sigma_p, sigma_theta)
+    return block_isotropic(sigma_p, sigma_theta, tangent_dim=tangent_dim)
 
 
-def read_graph(path: Path, reporter: Reporter, *, optimized: bool, reading: ReadingOptions) -> PoseGraph:
-    """The prior, in the plane.
+def read_graph(
+    path: Path,
+    reporter: Reporter,
+    *,
+    optimized: bool,
+    reading: ReadingOptions,
+    accepted: Callable[[PoseGraph], PoseGraph],
+) -> PoseGraph:
+    """The prior.
+
+    Parameters
+    ----------
+    accepted
+        Makes of the graph of the file the one to work with, or raises, before it is optimised.
 
     Raises
     ------
     FileError
-        For a graph in SE(3), besides all that `read_prior` refuses.
+        For all that `read_prior` refuses.
     """
-    prior = read_prior(path, reporter, optimized=optimized, reading=reading)
+    prior = read_prior(path, reporter, optimized=optimized, reading=reading, accepted=accepted)
     filed, graph = prior.filed, prior.graph
-    if graph.group.position_dim != 2:
-        advice = "if it is planar but for its format, pass --planar"
-        raise FileError(path, f"expected a graph in SE(2) to plan in the plane, got one in {graph.group.name}; {advice}")
     landmarks = f"{counted(graph.num_landmarks, 'landmark')}, " if graph.num_landmarks else ""
     reporter.say(f"{path}: {graph.num_poses} poses, {landmarks}{graph.num_edges} edges")
     if optimized:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -42,8 +43,17 @@ def read_filed(path: Path, reporter: Reporter, *, reading: ReadingOptions = _AS_
     return graph
 
 
-def read_prior(path: Path, reporter: Reporter, *, optimized: bool, reading: ReadingOptions = _AS_FILED) -> Prior:
+def read_prior(
+    path: Path,
+    reporter: Reporter,
+    *,
+    optimized: bool,
+    reading: ReadingOptions = _AS_FILED,
+    accepted: Callable[[PoseGraph], PoseGraph] | None = None,
+) -> Prior:
     """Read a pose graph and, if wanted, move it to its maximum-likelihood estimate.
+
+    What `accepted` makes of the connected graph takes its place before that; it may refuse it.
 
     Raises
     ------
@@ -59,7 +69,7 @@ def read_prior(path: Path, reporter: Reporter, *, optimized: bool, reading: Read
     except DisconnectedGraphError as error:
         largest = f"--component largest ({components(filed)[0].num_poses} of {filed.num_poses} poses)"
         raise FileError(path, f"{error}, with {largest} or --component ID") from None
-    return estimated(filed, reporter, optimized=optimized)
+    return estimated(filed if accepted is None else accepted(filed), reporter, optimized=optimized)
 
 
 def estimated(filed: PoseGraph, reporter: Reporter, *, optimized: bool) -> Prior:

@@ -38,7 +38,7 @@ def ros(
     robot_radius: options.RobotRadius = 0.35,
     vertices: options.Vertices = 1000,
     seed: options.Seed = 0,
-    spacing: options.Spacing = 1.0,
+    spacing: options.Spacing = None,
     max_detour: MaxDetour = 1.3,
     seconds: Seconds = 2.0,
     sigma_p: NoiseP = 0.05,
@@ -51,7 +51,7 @@ def ros(
     """
     require_extras("fast")
     from topobelief.candidates.propose import CandidateRule
-    from topobelief.cli import plan_stages, plan_world
+    from topobelief.cli import plan_world
     from topobelief.cli.answers import Answers
     from topobelief.cli.console import Reporter
     from topobelief.io.reading import ReadingOptions
@@ -62,13 +62,13 @@ def ros(
     node.load_ros("rclpy")
     reporter = Reporter(as_json=False, shows_progress=False)
     graph = world = None
+    if (graph_file is None) != (map_file is None):
+        raise typer.BadParameter("expected --graph and --map, or neither, got one of them.", param_hint="--graph")
     if graph_file is not None:
-        graph = plan_stages.read_graph(graph_file, reporter, optimized=True, reading=ReadingOptions())
-    if map_file is not None:
-        if graph is None:
-            raise typer.BadParameter("expected --graph too, by which the map is checked, got none.", param_hint="--map")
-        world = plan_world.read_world(map_file, graph, reporter, unknown=unknown)
-    rule = CandidateRule(num_vertices=vertices, robot_radius=robot_radius, seed=seed, spacing=spacing)
+        choice = plan_world.WorldChoice(map_file, along_trajectory=False, unknown=unknown)
+        choice.check()
+        graph, world = plan_world.read_planar(choice, graph_file, reporter, optimized=True, reading=ReadingOptions())
+    rule = CandidateRule(num_vertices=vertices, robot_radius=robot_radius, seed=seed, spacing=spacing or 1.0)
 
     def answers(situation: Situation) -> Answerer:
         return Answers(situation.graph, situation.world, situation.start, rule, max_detour, seconds)

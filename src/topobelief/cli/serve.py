@@ -42,7 +42,7 @@ def serve(
     robot_radius: options.RobotRadius = 0.35,
     vertices: options.Vertices = 1000,
     seed: options.Seed = 0,
-    spacing: options.Spacing = 1.0,
+    spacing: options.Spacing = None,
     max_detour: MaxDetour = 1.3,
     seconds: Seconds = 5.0,
     optimize: options.Optimize = True,
@@ -59,11 +59,10 @@ def serve(
 
     Serves the page to this machine alone, until Ctrl-C; it needs no network.
     """
-    if (map_file is None) == (not along_trajectory):
-        raise typer.BadParameter("expected one of --map FILE and --along-trajectory.", param_hint="the world")
     require_extras("fast")
+    from topobelief.candidates.predicted_factors import usual_spacing
     from topobelief.candidates.propose import CandidateRule
-    from topobelief.cli import plan_ends, plan_stages, plan_world
+    from topobelief.cli import plan_ends, plan_world
     from topobelief.cli.answers import Answers
     from topobelief.cli.console import Reporter
     from topobelief.errors import InvalidInputError
@@ -75,10 +74,11 @@ def serve(
     reading = reading_options(
         drop, robust_as_plain=robust_as_plain, edge2_order=edge2_order, component=component, planar=planar, topic=topic
     )
-    graph = plan_stages.read_graph(graph_file, reporter, optimized=optimize, reading=reading)
-    world = plan_world.read_world(map_file, graph, reporter, width=width, unknown=unknown, topic=map_topic)
+    choice = plan_world.WorldChoice(map_file, along_trajectory, width, unknown, topic=map_topic)
+    choice.check()
+    graph, world = plan_world.read_planar(choice, graph_file, reporter, optimized=optimize, reading=reading)
     begin = plan_ends.choose_start(graph, world, reporter, start)
-    rule = CandidateRule(num_vertices=vertices, robot_radius=robot_radius, seed=seed, spacing=spacing)
+    rule = CandidateRule(num_vertices=vertices, robot_radius=robot_radius, seed=seed, spacing=spacing or usual_spacing(graph))
     answers = Answers(graph, world, begin, rule, max_detour, seconds)
     with reporter.stage("roadmap"):
         reporter.say(str(answers.models["learned"]), f"roadmap: {counted(len(answers.roadmap.vertices), 'vertex', 'vertices')}")

@@ -89,7 +89,8 @@ def _factors_and_values(graph: PoseGraph, *, first_pose: int, first_edge: int) -
     information = np.ascontiguousarray(graph.noise[first_edge:, order][:, :, order])
     k, kinds = graph.group.position_dim, {kind.name: kind for kind in READING_KINDS}
     factors, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
-    keys = [key_of_id(node) for node in graph.ids.tolist()]
+    ids: list[int] = graph.ids.tolist()
+    keys = [key_of_id(node) for node in ids]
     for node, key in enumerate(keys[first_pose:], start=first_pose):
         pose = graph.poses[node]
         values.insert(key, np.array(pose[:k]) if graph.is_landmark[node] else _to_pose(gtsam, pose.tolist()))

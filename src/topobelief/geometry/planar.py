@@ -41,6 +41,11 @@ def quaternions_of_headings(headings: FloatArray) -> FloatArray:
     return np.column_stack([zero, zero, np.sin(headings / 2), np.cos(headings / 2)])
 
 
+def upright_poses(poses: FloatArray) -> FloatArray:
+    """Poses x, y, yaw as poses in space at height 0; shape (N, 3) to (N, 7)."""
+    return np.column_stack([poses[:, :2], np.zeros(len(poses)), quaternions_of_headings(poses[:, 2])])
+
+
 def headings_of_quaternions(quaternions: FloatArray) -> FloatArray:
     """Direction of the x axis, seen from above, radians; unit quaternions (x, y, z, w) of shape (N, 4) to (N,)."""
     rotation = SE3().rotation_matrix(np.concatenate([np.zeros((len(quaternions), 3)), quaternions], axis=1))

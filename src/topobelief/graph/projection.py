@@ -11,6 +11,7 @@ from topobelief.graph.pose_graph import PoseGraph
 from topobelief.symbols import node_name
 
 _MAX_TILT = np.pi / 6  # beyond it the heading in the plane says little
+_LEVEL = 1e-3  # metres of height, radians of tilt
 _PLANAR = np.array([0, 1, 5])  # x, y and yaw in the tangent of SE(3)
 
 
@@ -70,8 +71,25 @@ def _planar(poses: FloatArray) -> tuple[FloatArray, FloatArray]:
     """x, y and heading, shape (count, 3), and the angle between the z axis and the vertical, shape (count,)."""
     rotation = SE3_GROUP.rotation_matrix(poses)
     heading = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
-    tilt = np.arctan2(np.hypot(rotation[:, 0, 2], rotation[:, 1, 2]), rotation[:, 2, 2])
-    return np.column_stack([poses[:, :2], heading]), tilt
+    return np.column_stack([poses[:, :2], heading]), tilts(rotation)
+
+
+def tilts(rotation: FloatArray) -> FloatArray:
+    """Angle between the z axis of rotations and the vertical, radians; shape (N, 3, 3) to (N,)."""
+    return np.arctan2(np.hypot(rotation[:, 0, 2], rotation[:, 1, 2]), rotation[:, 2, 2])
+
+
+def is_planar(graph: PoseGraph) -> bool:
+    """Whether a graph in SE(3) lies in a horizontal plane, poses and measurements, and was only saved in 3D.
+
+    That is within a millimetre of height and a milliradian of tilt, the rounding of a file.
+    """
+    if graph.group is not SE3_GROUP:
+        return False
+    heights = graph.positions[:, 2]
+    level = float(np.ptp(heights)) <= _LEVEL and float(np.abs(graph.measurements[:, 2]).max(initial=0.0)) <= _LEVEL
+    turned = [tilts(SE3_GROUP.rotation_matrix(poses)).max(initial=0.0) for poses in (graph.poses, graph.measurements)]
+    return level and max(turned) <= _LEVEL
 
 
 def _require_upright(tilts: FloatArray, ids: IntArray, what: str, one: str) -> None:

@@ -33,10 +33,7 @@ def read_text(path: StrPath, *, any_encoding: bool = False) -> str:
     FileError
         If the file is missing, a directory, not readable, empty, or not text.
     """
-    try:
-        content = Path(path).read_bytes()
-    except OSError as error:
-        raise FileError(path, _reason(error, "a file to read")) from None
+    content = read_bytes(path)
     if not content.strip():
         raise FileError(path, "expected a text file, got an empty one")
     if b"\0" in content:
@@ -46,6 +43,20 @@ def read_text(path: StrPath, *, any_encoding: bool = False) -> str:
     except UnicodeDecodeError as error:
         raise FileError(path, f"expected a text file, got a binary one (not UTF-8 at byte {error.start})") from None
     return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def read_bytes(path: StrPath) -> bytes:
+    """The content of a file.
+
+    Raises
+    ------
+    FileError
+        If the file is missing, a directory or not readable.
+    """
+    try:
+        return Path(path).read_bytes()
+    except OSError as error:
+        raise FileError(path, _reason(error, "a file to read")) from None
 
 
 def read_head(path: StrPath, size: int = 65536) -> bytes:

@@ -16,6 +16,7 @@ from topobelief.errors import FileError, InvalidMapError
 from topobelief.io.bag_maps import read_bag_map
 from topobelief.io.bags import is_bag
 from topobelief.io.files import StrPath, read_text
+from topobelief.io.map_3d import is_map_3d
 from topobelief.io.ros_map import Unknown, read_ros_map
 from topobelief.world import World
 
@@ -47,6 +48,8 @@ def read_world(path: StrPath, *, unknown: Unknown = "occupied", topic: str | Non
         return read_ros_map(path, unknown=unknown)
     if suffix == ".csv":
         return read_walls(path)
+    if is_map_3d(path):
+        raise FileError(path, f"expected a floor plan, .yaml, .yml (ROS map) or .csv (walls), got {suffix}, a map in 3D")
     hint = "; name the YAML file that belongs to the image" if suffix in (".pgm", ".png", ".bmp", ".jpg", ".tif") else ""
     raise FileError(
         path, f"expected a map that ends in .yaml, .yml (ROS map) or .csv (walls), or a bag, got {suffix or 'no suffix'}{hint}"

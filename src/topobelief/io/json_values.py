@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+from collections.abc import Mapping
 from typing import Any, cast
 
 
@@ -15,3 +17,9 @@ def without_nan(value: Any) -> Any:
     if isinstance(value, list):
         return [without_nan(each) for each in cast("list[Any]", value)]
     return value
+
+
+def json_in_script(document: Mapping[str, Any]) -> str:
+    """JSON that may stand in a script element."""
+    text = json.dumps(without_nan(document), allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")

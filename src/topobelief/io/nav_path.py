@@ -8,7 +8,7 @@ from typing import Any
 import yaml
 
 from topobelief.arrays import FloatArray
-from topobelief.geometry.planar import quaternions_of_headings
+from topobelief.geometry.planar import upright_poses
 from topobelief.io.filed_path import FiledPath, path_of_quaternions
 from topobelief.io.files import StrPath
 from topobelief.io.yaml_fields import Field, read_documents
@@ -50,7 +50,7 @@ def _child(field: Field, name: str, expected: str) -> Field:
 
 
 def yaml_of_path(poses: FloatArray) -> str:
-    """The text of a YAML file of poses of shape (N, 3), in the frame "map", as `ros2 topic echo` prints it."""
+    """The text of a YAML file of poses of shape (N, 3), at height 0, or (N, 7), as `ros2 topic echo` prints it; frame "map"."""
     return yaml.safe_dump(_message(poses), sort_keys=False)
 
 
@@ -63,18 +63,17 @@ def _message(poses: FloatArray) -> dict[str, Any]:
     def header() -> dict[str, Any]:
         return {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": "map"}
 
-    places: list[list[float]] = poses[:, :2].tolist()
-    quaternions: list[list[float]] = quaternions_of_headings(poses[:, 2]).tolist()
+    rows: list[list[float]] = (poses if poses.shape[1] == 7 else upright_poses(poses)).tolist()
     return {
         "header": header(),
         "poses": [
             {
                 "header": header(),
                 "pose": {
-                    "position": dict(zip("xyz", (*place, 0.0), strict=True)),
-                    "orientation": dict(zip("xyzw", quaternion, strict=True)),
+                    "position": dict(zip("xyz", row[:3], strict=True)),
+                    "orientation": dict(zip("xyzw", row[3:], strict=True)),
                 },
             }
-            for place, quaternion in zip(places, quaternions, strict=True)
+            for row in rows
         ],
     }

@@ -89,8 +89,11 @@ def path_text(path: StrPath, poses: ArrayLike) -> str:
     """What `write_path` writes."""
     writer = _by_suffix(path, _WRITERS)
     array = frozen_floats(poses, name="poses")
-    if array.ndim != 2 or array.shape[1] != 3 or len(array) == 0 or not np.isfinite(array).all():
-        raise InvalidInputError(f"expected finite poses x, y, yaw of shape (N, 3), got {array.shape}; `path_poses` adds yaw")
+    if array.ndim != 2 or array.shape[1] not in (3, 7) or len(array) == 0 or not np.isfinite(array).all():
+        raise InvalidInputError(
+            f"expected finite poses x, y, yaw of shape (N, 3), or poses in space of shape (N, 7), got {array.shape}; "
+            "`path_poses` adds yaw"
+        )
     return writer(array)
 
 

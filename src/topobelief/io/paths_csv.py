@@ -45,6 +45,7 @@ def read_csv_path(path: StrPath) -> FiledPath:
 
 
 def csv_of_path(poses: FloatArray) -> str:
-    """The text of a CSV file of poses of shape (N, 3)."""
+    """The text of a CSV file of poses of shape (N, 3), or (N, 7), which `read_csv_path` does not read."""
     rows: list[list[float]] = poses.tolist()
-    return "".join(f"{','.join(map(str, row))}\n" for row in (["x", "y", "yaw"], *rows))
+    names = ["x", "y", "yaw"] if poses.shape[1] == 3 else ["x", "y", "z", "qx", "qy", "qz", "qw"]
+    return "".join(f"{','.join(map(str, row))}\n" for row in (names, *rows))

@@ -6,7 +6,7 @@ import numpy as np
 
 from topobelief.arrays import FloatArray
 from topobelief.errors import FileError
-from topobelief.geometry.planar import quaternions_of_headings
+from topobelief.geometry.planar import upright_poses
 from topobelief.io.filed_path import FiledPath, finite_numbers, numbered_lines, path_of_quaternions
 from topobelief.io.files import StrPath, read_text
 
@@ -45,9 +45,5 @@ def tum_rows(path: StrPath) -> tuple[FloatArray, list[int]]:
 
 def tum_of_path(poses: FloatArray) -> str:
     """The text of a TUM file of poses of shape (N, 3), at height 0, or (N, 7); they have no times, so these count poses."""
-    rows: list[list[float]] = (poses if poses.shape[1] == 7 else _upright(poses)).tolist()
+    rows: list[list[float]] = (poses if poses.shape[1] == 7 else upright_poses(poses)).tolist()
     return f"# {_COLUMNS}\n" + "".join(f"{time} {' '.join(map(str, row))}\n" for time, row in enumerate(rows))
-
-
-def _upright(poses: FloatArray) -> FloatArray:
-    return np.column_stack([poses[:, :2], np.zeros(len(poses)), quaternions_of_headings(poses[:, 2])])

@@ -69,7 +69,7 @@ def draw_search(
         front = canvas.panel(right, _BOTTOM + _MAP_HEIGHT - _FRONT_HEIGHT, _FRONT_WIDTH, _FRONT_HEIGHT)
         draw_front(result, front.axes)
         canvas.key(key, right - 0.45, _BOTTOM, corner="lower left")
-        canvas.title(_LEFT, _BOTTOM + _MAP_HEIGHT + 0.15, _title(result), _subtitle(result))
+        canvas.title(_LEFT, _BOTTOM + _MAP_HEIGHT + 0.15, search_title(result), search_subtitle(result))
     return canvas.figure
 
 
@@ -157,14 +157,16 @@ def _draw_ways(panel: Panel, result: SearchResult, others: list[FloatArray]) -> 
     return key
 
 
-def _title(result: SearchResult) -> str:
+def search_title(result: SearchResult) -> str:
+    """What was searched."""
     if not result.sees_map:
         return f"Nothing to gain within {result.max_length:.1f} m"
     found = "The best of" if result.proven_optimal else "The best way found among"
     return f"{found} all walks of up to {result.max_length:.1f} m"
 
 
-def _subtitle(result: SearchResult) -> str:
+def search_subtitle(result: SearchResult) -> str:
+    """What it found."""
     after = said(result.value - result.best.action.cost, result.objective)
     text = f"{after} after it, {said(result.value_now, result.objective)} now"
     if math.isinf(result.lower_bound) or result.proven_optimal:

@@ -15,7 +15,7 @@ from topobelief.planning.planner import Planner
 from topobelief.search.walks import Walk
 
 Predict = Callable[[list[FloatArray]], list[Action]]
-"""From paths, each of shape (waypoints, 2), to what driving each adds to the graph."""
+"""From paths, each of shape (waypoints, dim), to what driving each adds to the graph."""
 
 SAME_VALUE = 1e-9  # relative: values that differ by less are equal
 _NUM_LANDMARKS = 16
@@ -31,7 +31,7 @@ class Evaluations:
     planner
         Its objective is the value.
     predict
-    vertices : shape (V, 2)
+    vertices : shape (V, dim)
         Of the roadmap, metres; more may follow later.
     cost_per_metre
         In the unit of the objective; the value of a walk includes it.
@@ -61,7 +61,7 @@ class Evaluations:
         return len(self.objectives) + self._num_paths
 
     def path(self, walk: Walk) -> FloatArray:
-        """Places that a walk passes, shape (waypoints, 2)."""
+        """Places that a walk passes, shape (waypoints, dim)."""
         return self.vertices[list(walk)]
 
     def value(self, walk: Walk) -> float:

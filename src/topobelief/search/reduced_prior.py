@@ -107,7 +107,7 @@ class ReducedPrior:
             moves = _twists_to_moves(group, graph.positions[seen[is_landmark]] - graph.positions[pose])
             k = group.position_dim
             self.closures[is_landmark] = moves.transpose(0, 2, 1) @ observed[:k, :k] @ moves
-        rank = np.cumsum(~graph.is_landmark)  # steps of odometry are counted over poses
+        rank: IntArray = np.cumsum(~graph.is_landmark, dtype=np.int64)  # steps of odometry are counted over poses
         self.earliest = np.where(is_landmark, 1, earliest_numbers(rank[seen], int(rank[pose]), min_index_gap))
         self.variances = self._twists @ _variances(factor, seen) @ self._twists.transpose(0, 2, 1)
         self.mean_square, self._effects = np.nan, np.zeros((len(seen) * kappa, 0))

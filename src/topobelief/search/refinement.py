@@ -16,7 +16,7 @@ import numpy as np
 
 from topobelief.arrays import FloatArray
 from topobelief.candidates.polyline import checked_path, path_length
-from topobelief.candidates.roadmap import Roadmap, free_edges
+from topobelief.candidates.roadmap_graph import Roadmap, free_edges
 from topobelief.search.evaluations import SAME_VALUE, Evaluations
 from topobelief.search.walks import Walk
 
@@ -43,7 +43,7 @@ class Refinement:
 
     Parameters
     ----------
-    path : shape (waypoints, 2)
+    path : shape (waypoints, dim)
         Metres; its ends stay.
     value
         Of the path.
@@ -91,7 +91,8 @@ class Refinement:
     def _drawn(self) -> Iterator[_Change]:
         last, rng = len(self.path) - 1, self._rng
         for _ in range(_MOST_DRAWS * _BATCH):
-            kind, by = rng.random(), self._step * 10 ** rng.uniform(*_SPREAD) * rng.normal(size=2)
+            kind, scale = rng.random(), self._step * 10 ** rng.uniform(*_SPREAD)
+            by: FloatArray = scale * rng.normal(size=len(self.path[0]))
             if kind > _SHARES[1] or last == 1:
                 before = int(rng.integers(last))
                 place = self.path[before] + rng.random() * (self.path[before + 1] - self.path[before]) + by

@@ -20,7 +20,7 @@ class Way(ReadOnlyArrays):
 
     Attributes
     ----------
-    path : shape (waypoints, 2)
+    path : shape (waypoints, dim)
         Metres, world frame; its waypoints are vertices of the roadmap, but for those of a way that was refined. One waypoint:
         the robot stays where it is.
     action : Action
@@ -118,7 +118,7 @@ class SearchResult(ReadOnlyArrays):
 
     @property
     def path(self) -> FloatArray:
-        """The best way found, shape (waypoints, 2), metres."""
+        """The best way found, shape (waypoints, dim), metres."""
         return self.best.path
 
     @property

@@ -4,8 +4,9 @@ A new pose anywhere on a piece of a way is covered in two steps. It closes loops
 landmarks likewise: with all of them or, where at most k are allowed, with k of them; slopes are never negative, so the k
 largest are an upper bound. Its odometry
 
-    V(u) = (A_0 + u N A_0)^T Omega (A_0 + u N A_0),   A_0 = Ad(x)^-1 at the beginning of the way, N = Ad(exp(-e_x)) - I,
+    V(u) = (A_0 + u N A_0)^T Omega (A_0 + u N A_0),   A_0 = Ad(x)^-1 at the beginning of the way, N = Ad(exp(-d)) - I,
 
+d the direction of travel in the frame of the robot, which is not turned along the way,
 u metres further along the way, is a convex function of u: it lies below the chord between the ends of the piece. So a
 mixture of two plans, one with each end's odometry, has no less information than the walk, and one of the two is worth as
 much."""
@@ -210,15 +211,16 @@ class Rewards:
         return ways.begin[way] + begin[:, None] * along, ways.begin[way] + end[:, None] * along
 
 
-def odometry_powers(group: Group, poses: FloatArray, origin: FloatArray, information: FloatArray) -> FloatArray:
-    """Coefficients of V(u) for ways that begin at these poses, shape (3, E, kappa, kappa); twists are about the origin."""
-    step = np.zeros(group.tangent_dim)
-    step[0] = -1.0
+def odometry_powers(group: Group, ways: Ways, origin: FloatArray, information: FloatArray) -> FloatArray:
+    """Coefficients of V(u) for ways, shape (3, E, kappa, kappa); twists are about the origin."""
+    k = group.position_dim
+    step = np.zeros((len(ways.poses), group.tangent_dim))
+    step[:, :k] = -np.einsum("eji,ej->ei", group.rotation_matrix(ways.poses), ways.directions)
     shear = group.adjoint(group.exp(step)) - np.eye(group.tangent_dim)
-    at_begin = world_to_body(group, poses, origin)
-    turned = at_begin.transpose(0, 2, 1)
-    middle = shear.T @ information + information @ shear
-    return np.stack([turned @ matrix @ at_begin for matrix in (information, middle, shear.T @ information @ shear)])
+    at_begin = world_to_body(group, ways.poses, origin)
+    turned, flipped = at_begin.transpose(0, 2, 1), shear.transpose(0, 2, 1)
+    middle = flipped @ information + information @ shear
+    return np.stack([turned @ matrix @ at_begin for matrix in (information, middle, flipped @ information @ shear)])
 
 
 def ways_along(layers: Layers, path: IntArray) -> IntArray:

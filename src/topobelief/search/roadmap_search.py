@@ -18,7 +18,9 @@ from numpy.typing import ArrayLike
 from scipy.spatial import KDTree
 
 from topobelief.arrays import FloatArray
+from topobelief.candidates.attitude import Attitude
 from topobelief.candidates.closures import ClosureModel
+from topobelief.candidates.ends import SAME_PLACE, checked_place, shown_place
 from topobelief.candidates.learned_closures import learn_closures
 from topobelief.candidates.observations import ObservationModel, learn_observations
 from topobelief.candidates.predicted_factors import closure_information, default_information, predict_actions
@@ -41,7 +43,8 @@ from topobelief.search.result import SearchResult, Way
 from topobelief.search.topological_prior import OBJECTIVES, constant
 from topobelief.search.walk_bounds import walk_bounds
 from topobelief.search.walks import Walk, Walks
-from topobelief.world import World
+from topobelief.world import FreeSpace
+from topobelief.world.space import require_room_for, seen_by
 
 _NUM_CANDIDATES = 60  # vertices to lead walks through
 _DIFFERENT = 0.05  # share of the length limit by which alternatives differ (Fréchet)
@@ -61,7 +64,7 @@ def search_roadmap(
     objective: str = "error",
     closures: ClosureModel | None = None,
     observations: ObservationModel | None = None,
-    world: World | None = None,
+    world: FreeSpace | None = None,
     cost_per_metre: float = 0.0,
     deadline: float | None = None,
     gap: float = 0.0,
@@ -72,6 +75,7 @@ def search_roadmap(
     turn: float | None = None,
     information: ArrayLike | None = None,
     start: int | ArrayLike | Start | None = None,
+    attitude: Attitude | None = None,
     earlier: SearchResult | None = None,
     refine: bool = False,
     metric: bool = True,
@@ -88,8 +92,8 @@ def search_roadmap(
     roadmap
         Its first vertex is where walks begin.
     goal : shape (2,) or (3,), optional
-        Where walks end, metres; a heading is ignored. A place that is no vertex is joined to the roadmap. Default: walks end
-        anywhere.
+        Where walks end, metres: x, y with or without a heading, which is ignored; on a roadmap in space x, y, z. A place that
+        is no vertex is joined to the roadmap. Default: walks end anywhere.
     max_detour
         With a goal and without `max_length`: the limit in lengths of the shortest way, at least 1.
     max_length
@@ -118,7 +122,7 @@ def search_roadmap(
         Stop after about so many exact evaluations, in place of a deadline where runs are to be repeated; at least 1.
     num_alternatives
         How many other ways to return at most.
-    spacing, turn, information, start
+    spacing, turn, information, start, attitude
         As for `predict_actions`; by default new poses stand every metre, and not where the path turns. With a `turn` there is
         no lower bound.
     earlier
@@ -156,6 +160,7 @@ def search_roadmap(
     """
     began = clock()
     _check_numbers(max_detour, max_length, cost_per_metre, deadline, gap, enough, max_evaluations, num_alternatives)
+    require_room_for(graph, roadmap.world)
     if refine and earlier is not None and len(earlier.path) > 1:
         roadmap, _ = with_way(roadmap, earlier.path)
     walks = _walks_within(roadmap, goal, max_detour, max_length, return_to_start)
@@ -181,6 +186,7 @@ def search_roadmap(
             turn=turn,
             world=world,
             start=begin,
+            attitude=attitude,
         )
 
     def measure(actions: list[Action]) -> FloatArray:
@@ -189,11 +195,10 @@ def search_roadmap(
         return constant(objective, graph) - planner.decide(actions, proof="none").signatures
 
     evaluations = Evaluations(planner, predict, walks.roadmap.vertices, cost_per_metre, measure=measure)
-    to_poses: FloatArray = np.asarray(KDTree(graph.positions[graph.pose_indices, :2]).query(walks.roadmap.vertices)[0])
-    near = to_poses < model.radius
+    places = seen_by(roadmap.world, graph.positions)
+    near = np.asarray(KDTree(places[graph.pose_indices]).query(walks.roadmap.vertices)[0]) < model.radius
     if seeing is not None:
-        to_landmarks = np.asarray(KDTree(graph.positions[graph.is_landmark, :2]).query(walks.roadmap.vertices)[0])
-        near |= to_landmarks < seeing.max_range
+        near |= np.asarray(KDTree(places[graph.is_landmark]).query(walks.roadmap.vertices)[0]) < seeing.max_range
     candidates = spread_vias(walks, near, _NUM_CANDIDATES)
     local = LocalSearch(walks, evaluations, candidates, rng=np.random.default_rng(seed))
 
@@ -215,6 +220,7 @@ def search_roadmap(
             return_to_start=return_to_start,
             pose=begin.pose,
             metric=metric,
+            attitude=attitude,
         )
         shortest = 0.0 if goal is None else float(walks.distances(walks.start)[walks.end or 0])
         return BothBounds(flows, windows), FrontBounds(flows, shortest, walks.max_length)
@@ -330,18 +336,14 @@ def _walks_within(
         return Walks(roadmap, 0 if return_to_start else None, max_length)
     if return_to_start:
         raise InvalidInputError("expected a goal or return_to_start, got both; leave out the goal to return to the start")
-    place = np.asarray(goal, dtype=np.float64)
-    if place.shape not in ((2,), (3,)) or not np.isfinite(place).all():
-        raise InvalidInputError(f"expected a finite goal (x, y) or (x, y, theta), got {goal!r}")
-    apart = np.linalg.norm(roadmap.vertices - place[:2], axis=1)
+    place = checked_place(roadmap.world, goal, "goal")
+    apart = np.linalg.norm(roadmap.vertices - place, axis=1)
     end = int(np.argmin(apart))
-    if apart[end] > _SAME_PLACE:
+    if apart[end] > SAME_PLACE:
         roadmap, end = roadmap.between(roadmap.vertices[0], place), 1
     shortest = float(roadmap.distances_to(end)[0])
     if math.isinf(shortest):
-        raise PlanningError(
-            f"expected a goal that the roadmap leads to, got ({place[0]:g}, {place[1]:g}); build a roadmap for it"
-        )
+        raise PlanningError(f"expected a goal that the roadmap leads to, got {shown_place(place)}; build a roadmap for it")
     walks = Walks(roadmap, end, max_detour * shortest if max_length is None else max_length)
     if shortest > walks.limit:
         raise PlanningError(
@@ -360,6 +362,6 @@ def _walks_of(earlier: SearchResult | None, roadmap: Roadmap) -> list[Walk]:
         distances, vertices = tree.query(way.path)
         walk = tuple(np.atleast_1d(vertices).tolist())
         joined = all((min(pair), max(pair)) in edges for pair in itertools.pairwise(walk))
-        if joined and np.max(distances) <= _SAME_PLACE:
+        if joined and np.max(distances) <= SAME_PLACE:
             walks.append(walk)
     return walks

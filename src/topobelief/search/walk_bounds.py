@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from topobelief.candidates.attitude import Attitude, Legs, lifted
 from topobelief.candidates.closures import ClosureModel
 from topobelief.candidates.observations import ObservationModel
 from topobelief.candidates.roadmap import Roadmap
@@ -22,18 +24,26 @@ from topobelief.search.topological_prior import OBJECTIVES, SeenPrior, Topologic
 from topobelief.search.ways import Ways, cells_of_pieces, find_landmarks, find_sightings, first_pieces
 from topobelief.search.window_bound import WindowBound
 from topobelief.search.windows import Windows, find_odometry
-from topobelief.world import World
+from topobelief.world import FreeSpace
 
 _OBJECTIVES = ("error", "map", "joint", "per_pose")
 _ARCS = 400_000  # aimed at: as many layers as make about so many arcs
 _FINEST, _COARSEST = 40, 3  # pieces per spacing
 _FINE = 10  # pieces per pose; where more are affordable, steps are cheap and splitting does without cells
-_VARIABLES = 2000  # at most so many pairs of a new pose and a cell
+_ROWS = 6000  # at most so many for all pairs of a new pose and a cell, kappa for each
 _MOST_CELLS = 80
 _MOST_IN_WINDOWS = 1500  # seen poses, the covariance between all of which windows need
 _ARCS_OF_WINDOWS = 3_000_000
 _SAME_PLACE = 1e-9  # metres
 _ROUNDING = 1e-9  # relative; bounds are lowered by it
+
+
+class _OfMap(TypedDict):
+    """What priors have to know besides."""
+
+    probability: float
+    min_index_gap: int
+    with_errors: bool
 
 
 def walk_bounds(
@@ -49,13 +59,14 @@ def walk_bounds(
     spacing: float,
     information: ArrayLike,
     closure_information: ArrayLike | None = None,
-    world: World | None,
+    world: FreeSpace | None,
     cost_per_metre: float = 0.0,
     return_to_start: bool = False,
     pose: int | None = None,
     edge_costs: ArrayLike | None = None,
     pieces_per_pose: int | None = None,
     metric: bool = True,
+    attitude: Attitude | None = None,
 ) -> tuple[FlowBound, WindowBound | None]:
     """The bounds over the walks from one vertex of a roadmap: by flows, and by windows where there are such.
 
@@ -97,6 +108,8 @@ def walk_bounds(
         Into how many layers the spacing is cut. Default: as many as are affordable, from 4 to 40.
     metric
         False: of the objective as its signature estimates it (`topological_prior`); not for "per_pose".
+    attitude
+        Of new poses in SE(3), as for `predict_actions`.
 
     Raises
     ------
@@ -138,16 +151,18 @@ def walk_bounds(
     vertices = np.concatenate([kept, [-1]])  # the last one: the pose where the robot is
     place = np.full(len(roadmap.vertices), -1)
     place[kept] = np.arange(len(kept))
-    at_pose, begin = len(kept), graph.positions[pose, :2]
-    lead_in = float(np.linalg.norm(roadmap.vertices[start] - begin))
+    at_pose, begin = len(kept), graph.positions[pose]
+    places = lifted(roadmap.vertices, graph, pose)
+    lead_in = float(np.linalg.norm(places[start] - begin))
     has_lead = lead_in > _SAME_PLACE
     lead = [at_pose] if has_lead else []
-    points = np.concatenate([roadmap.vertices[kept], begin[None]])
+    points = np.concatenate([places[kept], begin[None]])
     source = np.r_[place[source], lead].astype(np.int64)
     target = np.r_[place[target], [place[start]] if has_lead else []].astype(np.int64)
-    ways = Ways(source, target, points[source], points[target], np.linalg.norm(points[target] - points[source], axis=1))
-    if len(ways.source) == 0:
+    if len(source) == 0:
         raise PlanningError(f"expected a roadmap with a way of at most {max_length:g} m from the start, got none; allow more")
+    legs = Legs(graph, attitude, dim=roadmap.world.dim)
+    ways = Ways(source, target, points[source], points[target], legs.poses(points[source], points[source], points[target]))
     driven = np.r_[lengths[edges], [0.0] if has_lead else []]
     prices = np.r_[cost_per_metre * lengths[edges] + extra[edges], [0.0] if has_lead else []]
     whole = max_length + (lead_in if has_lead else 0.0)
@@ -164,7 +179,10 @@ def walk_bounds(
     first_vertex = at_pose if has_lead else int(place[start])
     counts_idle = objective in ("joint", "per_pose")
     cells = _cells(
-        ways, delta, closures.radius, 1 if counts_idle or pieces_per_pose > _FINE else round(_VARIABLES * spacing / whole)
+        ways,
+        delta,
+        closures.radius,
+        1 if counts_idle or pieces_per_pose > _FINE else round(_ROWS * spacing / (graph.tangent_dim * whole)),
     )
     layers = build_layers(ways, first_vertex, remaining, is_end, whole, delta, pieces_per_pose, cells)
     num_new = max(1, int(layers.records.number.max(initial=1)))
@@ -173,24 +191,19 @@ def walk_bounds(
     seen = graph.pose_indices[sightings.seen]
     num_seen_poses, observed, most_landmarks = len(seen), None, 0
     if observations is not None and graph.num_landmarks:
-        landmarks = find_landmarks(graph, ways, pose, delta, observations, world)
+        landmarks = find_landmarks(graph, ways, delta, observations, world)
         sightings, seen = sightings.with_more(landmarks), np.concatenate([seen, landmarks.seen])
         observed = observations.information(graph.tangent_dim, graph.group.position_dim)
         most_landmarks = observations.max_per_pose or 0
     if not len(seen):
         seen, num_seen_poses = np.array([pose]), 1
-    options = {
-        "probability": closures.probability,
-        "min_index_gap": closures.min_index_gap,
-        "with_errors": objective == "error",
-    }
-    poses = ways.poses(graph, pose)
+    of_map = _OfMap(probability=closures.probability, min_index_gap=closures.min_index_gap, with_errors=objective == "error")
     if metric:
-        prior: SeenPrior = ReducedPrior(graph, pose, seen, of_closures, observed=observed, **options)
-        powers = odometry_powers(graph.group, poses, graph.positions[pose], omega)
+        prior: SeenPrior = ReducedPrior(graph, pose, seen, of_closures, observed=observed, **of_map)
+        powers = odometry_powers(graph.group, ways, graph.positions[pose], omega)
     else:
         form = WeightForm.of(objective, graph, omega, of_closures)
-        prior = TopologicalPrior.of(graph, pose, seen, of_closures, form, **options)
+        prior = TopologicalPrior.of(graph, pose, seen, of_closures, form, **of_map)
         powers = form.odometry_powers(omega, len(ways.source))
     idle = powers[0, 0] * float(counts_idle)
     fewest = max(0, math.ceil((whole - max_length + to_go[start]) / spacing - 1e-6))
@@ -231,7 +244,7 @@ def walk_bounds(
         or len(seen) > _MOST_IN_WINDOWS
     ):
         return flows, None
-    odometry = find_odometry(graph.group, ways, poses, graph.positions[pose], omega, sightings.first, delta, spacing)
+    odometry = find_odometry(graph.group, ways, graph.positions[pose], omega, sightings.first, delta, spacing)
 
     def windows() -> tuple[Windows, Layers]:
         size = spacing / 2

@@ -18,12 +18,14 @@ from scipy.spatial import KDTree
 from topobelief.arrays import BoolArray, FloatArray, IntArray
 from topobelief.candidates.closures import ClosureModel
 from topobelief.candidates.observations import ObservationModel
-from topobelief.candidates.polyline import distances_to_segments
+from topobelief.geometry.segments import distances_to_segments
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg.block_cholesky import Int32Array
 from topobelief.linalg.compiled import compiled
-from topobelief.world import World
-from topobelief.world.sight import SeenParts, seen_parts
+from topobelief.world import FreeSpace
+from topobelief.world.parts import Parts
+from topobelief.world.sight import seen_parts
+from topobelief.world.space import seen_by
 
 _ROUNDING = 1e-9
 _LOOSE = 2e-6  # relative: how much further than the rule a landmark counts as in view, beyond the rule's own rounding
@@ -37,31 +39,27 @@ class Ways:
     ----------
     source, target : shape (E,)
         Vertices.
-    begin, end : shape (E, 2)
+    begin, end : shape (E, k)
         Metres, world frame.
-    lengths : shape (E,)
-        Metres.
+    poses : shape (E, pose_size)
+        Of the robot at the beginning of each way; it is turned so all along it.
     """
 
     source: IntArray
     target: IntArray
     begin: FloatArray
     end: FloatArray
-    lengths: FloatArray
+    poses: FloatArray
 
     @property
-    def headings(self) -> FloatArray:
-        """Direction of travel, radians, shape (E,)."""
-        along = self.end - self.begin
-        return np.arctan2(along[:, 1], along[:, 0])
+    def lengths(self) -> FloatArray:
+        """Metres, shape (E,)."""
+        return np.linalg.norm(self.end - self.begin, axis=1)
 
-    def poses(self, graph: PoseGraph, pose: int) -> FloatArray:
-        """Upright poses at the beginning of each way, heading along it, at the height of a pose of the graph."""
-        if graph.group.pose_size == 3:
-            return np.column_stack([self.begin, self.headings])
-        zero, half = np.zeros(len(self.source)), self.headings / 2
-        height = np.full(len(self.source), graph.positions[pose, 2])
-        return np.column_stack([self.begin, height, zero, zero, np.sin(half), np.cos(half)])
+    @property
+    def directions(self) -> FloatArray:
+        """Unit vectors in the direction of travel, world frame, shape (E, k)."""
+        return (self.end - self.begin) / self.lengths[:, None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +100,7 @@ def first_pieces(lengths: FloatArray, delta: float) -> IntArray:
 
 
 def cells_of_pieces(ways: Ways, delta: float, cell: float) -> Int32Array:
-    """Label of the square of the plane in which the middle of each piece is, from 0 on, shape (P,)."""
+    """Label of the square of the plane, or the cube of space, in which the middle of each piece is, from 0 on, shape (P,)."""
     first = first_pieces(ways.lengths, delta)
     way = np.repeat(np.arange(len(ways.lengths)), np.diff(first))
     piece: IntArray = np.arange(int(first[-1])) - first[way]
@@ -113,7 +111,7 @@ def cells_of_pieces(ways: Ways, delta: float, cell: float) -> Int32Array:
 
 
 def find_sightings(
-    graph: PoseGraph, ways: Ways, pose: int, delta: float, rule: ClosureModel, world: World | None, latest: int
+    graph: PoseGraph, ways: Ways, pose: int, delta: float, rule: ClosureModel, world: FreeSpace | None, latest: int
 ) -> Sightings:
     """What is seen along each way.
 
@@ -130,16 +128,14 @@ def find_sightings(
     latest
         The largest number of a new pose; poses that are not far enough back even for it are left out.
     """
-    way, seen, lower, upper, squared_height = _seen_along(graph, ways, pose, rule, world, latest)
+    way, seen, lower, upper = _seen_along(graph, ways, pose, rule, world, latest)
     always = (seen > pose) | (pose - seen + 1 >= rule.min_index_gap)
     nearest = 0 if rule.max_per_pose is None else 3 * rule.max_per_pose - 2
-    at, aside = _beside(graph, ways, way, seen, squared_height)
+    at, aside = _beside(graph, ways, way, seen)
     return _listed(ways, delta, nearest, way, seen, lower, upper, at, aside, always)
 
 
-def find_landmarks(
-    graph: PoseGraph, ways: Ways, pose: int, delta: float, model: ObservationModel, world: World | None
-) -> Sightings:
+def find_landmarks(graph: PoseGraph, ways: Ways, delta: float, model: ObservationModel, world: FreeSpace | None) -> Sightings:
     """Landmarks that may be observed along each way: of those, new poses observe at most `model.max_per_pose`, the nearest.
 
     From u metres along a way, a landmark abeam at a and b aside of it is seen at the angle atan2(b, a - u): within half of the
@@ -147,19 +143,16 @@ def find_landmarks(
 
     Parameters
     ----------
-    graph, ways, pose, delta, world
+    graph, ways, delta, world
         As for `find_sightings`.
     model
     """
     landmarks = np.flatnonzero(graph.is_landmark)
-    height = np.zeros(graph.num_nodes)
-    if graph.group.position_dim > 2:
-        height = graph.positions[:, 2] - graph.positions[pose, 2]
     middle, reach = (ways.begin + ways.end) / 2, ways.lengths / 2 + model.max_range
-    lists = KDTree(graph.positions[landmarks, :2]).query_ball_point(middle, reach)
+    lists = KDTree(graph.positions[landmarks]).query_ball_point(middle, reach)
     way = np.repeat(np.arange(len(middle)), [len(near) for near in lists])
     seen = landmarks[np.concatenate([*(np.array(near, dtype=np.int64) for near in lists), np.zeros(0, dtype=np.int64)])]
-    at, aside = _beside(graph, ways, way, seen, height[seen] ** 2)
+    at, aside = _beside(graph, ways, way, seen)
     half = np.sqrt(np.maximum(model.max_range**2 - aside, 0.0))
     lower, upper = np.maximum(at - half, 0.0), np.minimum(at + half, ways.lengths[way])
     if model.field_of_view < 2 * math.pi:
@@ -168,7 +161,8 @@ def find_landmarks(
     kept = np.flatnonzero((aside <= model.max_range**2) & (lower <= upper))
     lower, upper = lower[kept], upper[kept]
     if world is not None:
-        parts = seen_parts(world, graph.positions[seen[kept], :2], ways.begin[way[kept]], ways.end[way[kept]])
+        places = (graph.positions[seen[kept]], ways.begin[way[kept]], ways.end[way[kept]])
+        parts = seen_parts(world, *(seen_by(world, each) for each in places))
         kept = kept[parts.which]
         length = ways.lengths[way[kept]]
         lower = np.maximum(lower[parts.which], parts.lower * length)
@@ -179,14 +173,11 @@ def find_landmarks(
     return _listed(ways, delta, model.max_per_pose or 0, way[kept], seen[kept], lower, upper, at[kept], aside[kept], always)
 
 
-def _beside(
-    graph: PoseGraph, ways: Ways, way: IntArray, seen: IntArray, squared_height: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def _beside(graph: PoseGraph, ways: Ways, way: IntArray, seen: IntArray) -> tuple[FloatArray, FloatArray]:
     """Metres along the way to where a node is abeam, and its squared distance from the line."""
-    offset = graph.positions[seen, :2] - ways.begin[way]
-    along = (ways.end - ways.begin)[way] / ways.lengths[way, None]
-    at = np.sum(offset * along, axis=1)
-    return at, np.maximum(np.sum(offset**2, axis=1) - at**2 + squared_height, 0.0)
+    offset = graph.positions[seen] - ways.begin[way]
+    at = np.sum(offset * ways.directions[way], axis=1)
+    return at, np.maximum(np.sum(offset**2, axis=1) - at**2, 0.0)
 
 
 def _listed(
@@ -212,23 +203,21 @@ def _listed(
 
 
 def _seen_along(
-    graph: PoseGraph, ways: Ways, pose: int, rule: ClosureModel, world: World | None, latest: int
-) -> tuple[IntArray, IntArray, FloatArray, FloatArray, FloatArray]:
-    """Way, pose, and metres along the way from where to where it may be seen; and its height over the way, squared."""
-    positions = graph.positions[:, :2]
-    height = graph.positions[:, 2] - graph.positions[pose, 2] if graph.group.position_dim == 3 else np.zeros(graph.num_nodes)
+    graph: PoseGraph, ways: Ways, pose: int, rule: ClosureModel, world: FreeSpace | None, latest: int
+) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+    """Way, pose, and metres along the way from where to where it may be seen."""
+    positions = graph.positions
     middle, reach = (ways.begin + ways.end) / 2, ways.lengths / 2 + rule.radius
     lists = KDTree(positions).query_ball_point(middle, reach)
     way = np.repeat(np.arange(len(middle)), [len(near) for near in lists])
     seen = np.concatenate([*(np.array(near, dtype=np.int64) for near in lists), np.zeros(0, dtype=np.int64)])
     far_enough_back = (seen > pose) | (pose - seen + latest >= rule.min_index_gap)
     distance = distances_to_segments(positions[seen], ways.begin[way], ways.end[way])
-    kept = far_enough_back & (distance**2 + height[seen] ** 2 < rule.radius**2) & _aligned(graph, ways, pose, way, seen, rule)
+    kept = far_enough_back & (distance < rule.radius) & _aligned(graph, ways, way, seen, rule)
     way, seen = way[kept], seen[kept]
-    along = (ways.end - ways.begin)[way] / ways.lengths[way, None]
     offset = positions[seen] - ways.begin[way]
-    at = np.sum(offset * along, axis=1)
-    half = np.sqrt(np.maximum(rule.radius**2 - height[seen] ** 2 - np.sum(offset**2, axis=1) + at**2, 0.0))
+    at = np.sum(offset * ways.directions[way], axis=1)
+    half = np.sqrt(np.maximum(rule.radius**2 - np.sum(offset**2, axis=1) + at**2, 0.0))
     lower, upper = np.maximum(at - half, 0.0), np.minimum(at + half, ways.lengths[way])
     if world is not None:
         parts = _seen_parts(world, ways, positions, way, seen)
@@ -240,27 +229,28 @@ def _seen_along(
         way, seen = way[parts.which], seen[parts.which]
         overlap = lower <= upper
         way, seen, lower, upper = way[overlap], seen[overlap], lower[overlap], upper[overlap]
-    return way, seen, lower, upper, height[seen] ** 2
+    return way, seen, lower, upper
 
 
-def _seen_parts(world: World, ways: Ways, positions: FloatArray, way: IntArray, seen: IntArray) -> SeenParts:
+def _seen_parts(world: FreeSpace, ways: Ways, positions: FloatArray, way: IntArray, seen: IntArray) -> Parts:
     """What of some ways poses see; a way and the way back are looked at once."""
     source, target = ways.source[way], ways.target[way]
     size = int(max(ways.source.max(), ways.target.max())) + 1
     keys = (np.minimum(source, target) * size + np.maximum(source, target)) * len(positions) + seen
     _, one, same = np.unique(keys, return_index=True, return_inverse=True)
-    parts = seen_parts(world, positions[seen[one]], ways.begin[way[one]], ways.end[way[one]])
+    places = (positions[seen[one]], ways.begin[way[one]], ways.end[way[one]])
+    parts = seen_parts(world, *(seen_by(world, each) for each in places))
     first = np.searchsorted(parts.which, np.arange(len(one) + 1))
     count = np.diff(first)[same]
     which = np.repeat(np.arange(len(way)), count)
     at = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count) + np.repeat(first[same], count)
     back = (source != source[one][same])[which]
     lower, upper = parts.lower[at], parts.upper[at]
-    return SeenParts(which, np.where(back, 1 - upper, lower), np.where(back, 1 - lower, upper))
+    return Parts(which, np.where(back, 1 - upper, lower), np.where(back, 1 - lower, upper))
 
 
-def _aligned(graph: PoseGraph, ways: Ways, pose: int, way: IntArray, seen: IntArray, rule: ClosureModel) -> BoolArray:
-    relative = graph.group.between(ways.poses(graph, pose)[way], graph.poses[seen])
+def _aligned(graph: PoseGraph, ways: Ways, way: IntArray, seen: IntArray, rule: ClosureModel) -> BoolArray:
+    relative = graph.group.between(ways.poses[way], graph.poses[seen])
     turned = np.linalg.norm(graph.group.rotation_vector(relative), axis=1)
     return turned <= rule.angle * (1 + _ROUNDING) + _ROUNDING
 

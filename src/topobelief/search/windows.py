@@ -58,7 +58,6 @@ class Odometry:
 def find_odometry(
     group: Group,
     ways: Ways,
-    poses: FloatArray,
     origin: FloatArray,
     information: FloatArray,
     first: IntArray,
@@ -70,8 +69,6 @@ def find_odometry(
     Parameters
     ----------
     group, ways
-    poses
-        At the beginning of each way.
     origin
         Of the twists.
     information
@@ -95,7 +92,7 @@ def find_odometry(
         along = u[:, None, None]
         return powers[0, way] + along * (powers[1, way] + along * powers[2, way])
 
-    powers = odometry_powers(group, poses, origin, information)
+    powers = odometry_powers(group, ways, origin, information)
     middle = at(powers, (begin + end) / 2)
     ends = np.stack([at(powers, begin), at(powers, end)])
     ratios: FloatArray = np.real(np.linalg.eigvals(np.linalg.solve(middle, ends))).astype(np.float64)
@@ -105,7 +102,7 @@ def find_odometry(
     lever = (spacing + 2 * delta) * scale[0] / scale[k]
     sheared = 1 + lever**2 / 2 + lever * np.sqrt(1 + lever**2 / 4)
     largest_excess = float(np.max(excess, initial=1.0)) * (1 + 1e-9)
-    before = largest_excess * sheared * at(odometry_powers(group, poses, origin, equal), (begin + end) / 2)
+    before = largest_excess * sheared * at(odometry_powers(group, ways, origin, equal), (begin + end) / 2)
     variances = 1 / (low * scale**2)  # at least the covariance
     about = np.zeros((2, kappa))
     about[0, :k], about[0, k:], about[1, :k] = variances[:k], 2 * variances[k:], 2 * variances[k]

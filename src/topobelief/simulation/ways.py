@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from topobelief.arrays import FloatArray
-from topobelief.candidates.polyline import distances_to_segments, path_length, stations
+from topobelief.candidates.polyline import path_length, stations
 from topobelief.candidates.propose import CandidateRule, Candidates, propose
 from topobelief.errors import PlanningError
+from topobelief.geometry.segments import distances_to_segments
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.simulation.scenario import Goal
 from topobelief.world import World

@@ -8,7 +8,9 @@ from numpy.typing import ArrayLike
 from topobelief.arrays import FloatArray
 from topobelief.errors import InvalidMapError
 from topobelief.world import shapes
+from topobelief.world.space import FreeSpace
 from topobelief.world.world import World
+from topobelief.world.world_3d import World3D
 
 _SLACK = 0.03  # of the radius: erosions are off by up to 0.02 of it
 _DIGITS = 2  # of the coordinates of a place: centimetres, which a person can type
@@ -16,23 +18,23 @@ _ROUNDING = 0.01  # metres by which rounding may move a place, and more
 
 
 def nearest_free_place(
-    world: World, place: ArrayLike, robot_radius: float, *, reachable_from: ArrayLike | None = None
+    world: FreeSpace, place: ArrayLike, robot_radius: float, *, reachable_from: ArrayLike | None = None
 ) -> FloatArray | None:
     """About the nearest place where the centre of a robot can be, in whole centimetres.
 
     Parameters
     ----------
     world
-    place : shape (2,)
+    place : shape (dim,)
         Metres, anywhere.
     robot_radius
         Metres.
-    reachable_from : shape (2,), optional
-        Where given, the robot can drive from there to the place.
+    reachable_from : shape (dim,), optional
+        Where given, the robot can drive from there to the place; not heeded in space.
 
     Returns
     -------
-    shape (2,), or None where no room is found
+    shape (dim,), or None where no room is found
         Its clearance is above the radius. There may be nearer places with hardly more room than the radius, by some 3 % of
         it and a centimetre.
 
@@ -43,6 +45,11 @@ def nearest_free_place(
     [3.68, 5.0]
     """
     target = np.asarray(place, dtype=np.float64)
+    if isinstance(world, World3D):
+        found = world.nearest_free_place(target, robot_radius * (1 + _SLACK) + _ROUNDING)
+        return None if found is None else np.round(found, _DIGITS)
+    if not isinstance(world, World):
+        raise TypeError(f"expected a World or a World3D, got {type(world).__name__}")
     room = robot_radius * (1 + _SLACK) + _ROUNDING
     if reachable_from is None:
         free = shapes.eroded(world.free, room)

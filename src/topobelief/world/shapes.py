@@ -195,23 +195,6 @@ def nearest_place(shape: Shape, place: FloatArray) -> FloatArray:
     return _shapely.get_coordinates(_shapely.shortest_line(shape, point(place)))[0]
 
 
-class SegmentIndex:
-    """Straight segments, indexed by where they are.
-
-    Parameters
-    ----------
-    starts, ends : shape (N, 2)
-    """
-
-    def __init__(self, starts: FloatArray, ends: FloatArray) -> None:
-        self._tree = cast("Any", shapely.STRtree)(segments(starts, ends))
-
-    def near(self, place: FloatArray, distance: float) -> IntArray:
-        """Segments whose extent overlaps the square around a place: all within the distance from it, and some others."""
-        x, y = place.tolist()
-        return self._tree.query(shapely.box(x - distance, y - distance, x + distance, y + distance))
-
-
 class Region:
     """An open region with its boundary, indexed for many queries.
 

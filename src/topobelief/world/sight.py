@@ -1,54 +1,63 @@
-"""Which parts of straight ways are seen from places: exact, by the shadows that walls throw on each way."""
+"""Which parts of straight ways are seen from places: in the plane exact, by the shadows that walls throw on each way."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from topobelief.arrays import FloatArray, IntArray
+from topobelief.arrays import FloatArray
+from topobelief.world.parts import Parts, uncovered
+from topobelief.world.space import FreeSpace
 from topobelief.world.world import World
+from topobelief.world.world_3d import World3D
 
-_TOUCHING = 1e-9  # share of a way; shadows that are nearer to each other are one
+_LINES = 6  # across the lines of sight in space
 _FLAT = 1e-12  # relative area of a triangle below which a place counts as being on the line of the way
 
 
-class SeenParts(NamedTuple):
-    """Parts of ways, each seen from the place that belongs to the way.
+def seen_parts(world: FreeSpace, places: FloatArray, starts: FloatArray, ends: FloatArray) -> Parts:
+    """What is seen of each way from a place of its own; the parts are in the order of the ways.
 
-    Attributes
-    ----------
-    which : shape (P,)
-        Index of the place and its way, ascending; one may have several parts, or none.
-    lower, upper : shape (P,)
-        Where the part begins and ends, shares of the way from 0 to 1.
-    """
-
-    which: IntArray
-    lower: FloatArray
-    upper: FloatArray
-
-
-def seen_parts(world: World, places: FloatArray, starts: FloatArray, ends: FloatArray) -> SeenParts:
-    """What is seen of each way from a place of its own.
-
-    Nothing that is visible by `World.visible` is left out; beyond that, parts may be larger by some 1e-9 of a way, and walls
-    hide nothing where the place is on the line of the way.
+    Nothing that is visible by `visible` is left out. Beyond that, parts may be larger: in the plane by some 1e-9 of a way, and
+    walls hide nothing where the place is on the line of the way; in space by what hides the way only from between the lines
+    that are tried (see `_seen_in_space`).
 
     Parameters
     ----------
     world
-    places, starts, ends : shape (N, 2)
+    places, starts, ends : shape (N, dim)
         A place, and the ends of a way that lies in free space.
     """
     inside = np.flatnonzero(world.contains(places))
     place, start, end = places[inside], starts[inside], ends[inside]
+    if isinstance(world, World):
+        seen = _seen_in_plane(world, place, start, end)
+    elif isinstance(world, World3D):
+        seen = _seen_in_space(world, place, start, end)
+    else:
+        raise TypeError(f"expected a World or a World3D, got {type(world).__name__}")
+    return Parts(inside[seen.which], seen.lower, seen.upper)
+
+
+def _seen_in_space(world: World3D, place: FloatArray, start: FloatArray, end: FloatArray) -> Parts:
+    """Parts of which the line of sight is free at each of some shares of its length.
+
+    At share h of its length, the lines of sight from a place to all of a way pass one straight line, parallel to the way. What
+    of that is not free hides the same shares of the way.
+    """
+    hidden: list[Parts] = []
+    for share in (np.arange(_LINES) + 0.5) / _LINES:
+        free = world.free_parts(place + share * (start - place), place + share * (end - place))
+        hidden.append(uncovered(free, len(place)))
+    return uncovered(Parts(*(np.concatenate(columns) for columns in zip(*hidden, strict=True))), len(place))
+
+
+def _seen_in_plane(world: World, place: FloatArray, start: FloatArray, end: FloatArray) -> Parts:
+    """Parts on which no wall throws a shadow."""
     corners = np.stack([place, start, end])
     near, wall_starts, wall_ends = world.walls_in_boxes(corners.min(axis=0), corners.max(axis=0))
     from_, to = _shadows(start[near] - place[near], end[near] - place[near], wall_starts - place[near], wall_ends - place[near])
     dark = from_ <= to
-    which, lower, upper = _lit(near[dark], from_[dark], to[dark], len(inside))
-    return SeenParts(inside[which], lower, upper)
+    return uncovered(Parts(near[dark], from_[dark], to[dark]), len(place))
 
 
 def _shadows(a: FloatArray, b: FloatArray, first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -81,22 +90,3 @@ def _shadows(a: FloatArray, b: FloatArray, first: FloatArray, second: FloatArray
         before = hidden & (alpha + beta > 0)
         shares.append(np.clip(beta / np.where(before, alpha + beta, 1.0), 0.0, 1.0))
     return np.where(hidden, np.minimum(*shares), 1.0), np.where(hidden, np.maximum(*shares), 0.0)
-
-
-def _lit(which: IntArray, lower: FloatArray, upper: FloatArray, count: int) -> tuple[IntArray, FloatArray, FloatArray]:
-    """What shadows leave of each of `count` ways: the way's index, and the shares from and to."""
-    order = np.lexsort([lower, which])
-    which, lower, upper = which[order], lower[order], upper[order]
-    # The furthest end of the shadows so far on the same way: ways are moved apart, so that one running maximum serves all.
-    reach = np.maximum.accumulate(upper + 2.0 * which) - 2.0 * which if len(which) else upper
-    first = np.r_[True, which[1:] != which[:-1]] if len(which) else np.zeros(0, dtype=bool)
-    before = np.where(first, 0.0, np.r_[0.0, reach[:-1]][: len(reach)])
-    last = np.r_[first[1:], True] if len(which) else first
-    clear = np.setdiff1d(np.arange(count), which)
-    gaps = lower > before + _TOUCHING
-    tail = last & (reach < 1 - _TOUCHING)
-    index = np.concatenate([clear, which[gaps], which[tail]])
-    start = np.concatenate([np.zeros(len(clear)), before[gaps], reach[tail]])
-    end = np.concatenate([np.ones(len(clear)), lower[gaps], np.ones(np.count_nonzero(tail))])
-    order = np.lexsort([start, index])
-    return index[order], np.maximum(start[order] - _TOUCHING, 0.0), np.minimum(end[order] + _TOUCHING, 1.0)

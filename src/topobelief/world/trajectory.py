@@ -34,7 +34,7 @@ def region_of_trajectory(graph: PoseGraph, width: float | None = None) -> shapes
     if graph.positions.shape[1] != 2:
         raise InvalidInputError(
             f"expected a graph in SE(2), got {graph.group.name}: a planar world would join storeys that lie above one "
-            "another; give a floor plan instead"
+            "another; use World3D.from_trajectory, or give a floor plan"
         )
     graph = graph.poses_alone
     if width is None:

@@ -167,6 +167,16 @@ class World:
         """
         return cls(region_of_trajectory(graph, width))
 
+    @property
+    def dim(self) -> int:
+        """2."""
+        return 2
+
+    @property
+    def corners(self) -> FloatArray:
+        """Opposite corners of the bounds, shape (2, 2)."""
+        return np.reshape(self.bounds, (2, 2))
+
     @cached_property
     def digest(self) -> str:
         """32 hexadecimal digits, the same for worlds of the same free region and bounds."""

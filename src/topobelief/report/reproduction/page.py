@@ -6,7 +6,6 @@ What comes from data is escaped; what the page's script reads is JSON in which n
 from __future__ import annotations
 
 import base64
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -20,7 +19,7 @@ from shapely import MultiPolygon
 
 from topobelief.arrays import FloatArray
 from topobelief.candidates.polyline import subdivided
-from topobelief.io.json_values import without_nan
+from topobelief.io.json_values import json_in_script
 from topobelief.optional import load
 from topobelief.report.reproduction.beyond_table import beyond_cells
 from topobelief.report.reproduction.choice_table import choice_cells
@@ -77,7 +76,7 @@ def page(found: Reproduction, figures: Sequence[NamedFigure], pictures: Mapping[
         tables=", ".join(f'<a href="tables/{escape(name)}.csv">{escape(name)}</a>' for name in tables),
         facts="".join(f"<tr><td>{escape(name)}</td><td>{escape(value)}</td></tr>" for name, value in facts(found).items()),
         plotly=_plotly(),
-        data=_json(_data(found)),
+        data=json_in_script(_data(found)),
         script=_text("page.js"),
     )
 
@@ -180,12 +179,6 @@ def _rings(shape: MultiPolygon) -> list[Any]:
 
 def _rounded(points: FloatArray) -> list[Any]:
     return np.round(points, 3).tolist()
-
-
-def _json(document: Mapping[str, Any]) -> str:
-    """JSON that may stand in a script element."""
-    text = json.dumps(without_nan(document), allow_nan=False, separators=(",", ":"))
-    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
 def _plotly() -> str:

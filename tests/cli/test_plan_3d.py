@@ -1,0 +1,101 @@
+"""`topobelief plan` in space: on the floors of a ramp, as free flight, in a voxel world, and on a plane saved in 3D."""
+
+import json
+
+import numpy as np
+import pytest
+
+from drives_3d import ramp
+from topobelief.geometry import SE3_GROUP
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.io.g2o import write_g2o
+
+SOON = ("--vertices", "60", "--robot-radius", "0.3", "--candidates", "2", "--no-exact")
+
+
+@pytest.fixture
+def garage(tmp_path):
+    """A drive up a ramp, measured with noise."""
+    graph = ramp()
+    rng = np.random.default_rng(0)
+    a, b = graph.edges.T
+    noise = 0.01 * rng.normal(size=(graph.num_edges, 6))
+    measured = SE3_GROUP.compose(SE3_GROUP.between(graph.poses[a], graph.poses[b]), SE3_GROUP.exp(noise))
+    file = tmp_path / "garage.g2o"
+    write_g2o(PoseGraph(graph.poses, graph.edges, measured, graph.information), file)
+    return file
+
+
+def test_a_drive_over_the_floors(topobelief, garage, tmp_path):
+    """Without a map or any option of 3D: picture, page, decision and path."""
+    outcome = topobelief(["plan", str(garage), "--goal", "2", *SOON, "--width", "3", "--write-path", "path.tum"])
+    assert outcome.code == 0, outcome.err
+    assert "for a robot that drives (--flying for one that flies)" in outcome.out
+    assert "1.00 m above and below it" in outcome.out
+    assert "2 paths from" in outcome.out
+    document = json.loads((tmp_path / "out" / "decision.json").read_text())
+    assert len(document["actions"][0]["waypoints"][0]) == 3
+    chosen = np.array(document["chosen"]["x_y_z_quaternion"])
+    assert chosen.shape[1] == 7
+    assert document["chosen"]["length"] > 50
+    np.testing.assert_allclose(np.linalg.norm(chosen[:, 3:], axis=1), 1)
+    np.testing.assert_allclose(np.loadtxt("path.tum")[:, 1:], chosen)
+    page = (tmp_path / "out" / "paths.html").read_text()
+    assert page.count("<script>") == 2
+    assert "src=" not in page.split("<script>")[0]
+    assert (tmp_path / "out" / "paths.png").stat().st_size > 20_000
+
+
+def test_a_flight_takes_the_short_way_up(topobelief, garage, tmp_path):
+    options = ["--flying", "--width", "4", "--goal", "10", "0", "1", "--out", "fly", "--attitude", "along"]
+    outcome = topobelief(["plan", str(garage), *SOON, *options])
+    assert outcome.code == 0, outcome.err
+    assert "for a robot that flies" in outcome.out
+    document = json.loads((tmp_path / "fly" / "decision.json").read_text())
+    assert document["actions"][0]["length"] < 20
+    assert document["options"]["attitude"] == "along"
+
+
+def test_a_search_in_a_voxel_world(topobelief, garage, tmp_path):
+    """Around the ramp everything is free; a search needs no more options than in the plane."""
+    pytest.importorskip("numba")
+    np.save(tmp_path / "hall.npy", np.zeros((14, 14, 8), dtype=bool))
+    arguments = ["plan", str(garage), "--map", "hall.npy", "--resolution", "2", "--origin", "-14", "-14", "-4"]
+    arguments += ["--goal", "30", "--vertices", "40", "--spacing", "4", "--max-evaluations", "10"]
+    outcome = topobelief(arguments)
+    assert outcome.code == 0, outcome.err
+    assert "world: hall.npy, 28.0 × 28.0 × 16.0 m" in outcome.out
+    assert "No walk of the roadmap" in outcome.out or "Proven" in outcome.out
+    assert json.loads((tmp_path / "out" / "decision.json").read_text())["search"]["lower_bound"] is not None
+
+
+def test_a_plane_saved_in_3d_is_projected(topobelief, tmp_path):
+    poses = np.array([[x, 0, 2, 0, 0, 0, 1] for x in range(8)], dtype=float)
+    write_g2o(PoseGraph(poses, [(i, i + 1) for i in range(7)], None, 100 * np.eye(6)), tmp_path / "flat.g2o")
+    outcome = topobelief(["plan", "flat.g2o", "--along-trajectory", "--goal", "0", "0", "--width", "1", *SOON])
+    assert outcome.code == 0, outcome.err
+    assert (
+        "the graph lies in a plane and is projected onto the plane: dropped heights from 2 to 2 m" in outcome.out + outcome.err
+    )
+    assert "x_y_yaw" in json.loads((tmp_path / "out" / "decision.json").read_text())["chosen"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--goal", "1", "2"], "expected --goal as X Y Z for a graph in SE(3), got 2 numbers"),
+        (["--goal", "0", "0", "0"], "choose the nearest free place"),
+        (["--goal", "2", "--path", "own.csv"], "expected no --path in 3D"),
+        (["--goal", "2", "--driving", "--height", "5", "--width", "3"], "expected --height below --width"),
+        (["--goal", "2", "--flying", "--map", "cloud.pcd"], "expected no --map with --flying or --driving"),
+        (["--goal", "2", "--map", "cloud.pcd"], "nothing of that name"),
+        (["--goal", "2", "--map", "grid.npy"], "give --resolution"),
+    ],
+)
+def test_what_makes_no_sense_in_space(topobelief, garage, tmp_path, options, message):
+    np.save(tmp_path / "grid.npy", np.zeros((2, 2, 2)))
+    outcome = topobelief(["plan", str(garage), *options, "--vertices", "50", "--out", "result"])
+    assert outcome.code == 2
+    assert outcome.err.count("\n") == 1
+    assert message in outcome.err
+    assert not (tmp_path / "result").exists()
