@@ -78,11 +78,11 @@ def row(graph, world, objective, options):
     values, lengths = np.array([each.value for each in found]), [each.length for each in found]
     if options.verbose:
         print("metres apart:", np.round(apart, 1).tolist())
-    unit, scale = ("cm", 100) if objective == "error" else ("nats", 1)
+    least = f"{100 * values.min():.4g} cm" if objective == "error" else f"{values.min():.1f} nats"
     spread = f"{100 * np.ptp(values) / values.min():.1f} %" if objective == "error" else f"{np.ptp(values):.2f} nats"
     goal = "({:g}, {:g})".format(*options.goal)
     return (
-        f"| {Path(options.graph).stem} | {goal} | `{objective}` | {scale * values.min():.4g} {unit} | {spread} "
+        f"| {Path(options.graph).stem} | {goal} | `{objective}` | {least} | {spread} "
         f"| {min(lengths):.1f} … {max(lengths):.1f} m | {same.sum(axis=1).max()} of {len(found)} "
         f"| {seconds:.1f} |"
     )
