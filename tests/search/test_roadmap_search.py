@@ -13,8 +13,11 @@ from roadmap_walks import random_case
 from small_roadmaps import OPEN, drive, simple_walks, small_roadmap, values_of
 from topobelief.candidates.roadmap import Roadmap
 from topobelief.errors import InvalidInputError, NotOptimizedWarning
+from topobelief.search.evaluations import Evaluations
 from topobelief.search.flows import FlowBound
+from topobelief.search.local_search import LocalSearch, spread_vias
 from topobelief.search.result import SearchResult
+from topobelief.search.walks import Walks
 
 CLOSURES = tb.ClosureModel(radius=1.5, max_per_pose=2, probability=1.0, min_index_gap=3)
 
@@ -216,6 +219,24 @@ def test_a_single_pose_has_no_error_to_lose():
     found = tb.search_roadmap(graph, roadmap, **options)
     assert found.value == found.value_now == 0.0
     assert found.length == 4.0
+
+
+def test_each_via_vertex_is_tried_alone_before_any_two():
+    graph, roadmap = scene(6, num_vertices=20)
+    walks = Walks(roadmap, 1, 8.0 + roadmap.distances_to(1)[0])
+    planner = tb.Planner(graph, objective="map")
+    evaluations = Evaluations(
+        planner, lambda paths: tb.predict_actions(graph, paths, closures=CLOSURES, turn=None), roadmap.vertices, 0.0
+    )
+    candidates = spread_vias(walks, walks.in_reach, 60)
+    local = LocalSearch(walks, evaluations, candidates, rng=np.random.default_rng(0))
+    local.seed([walks.walk(())])
+    alone = {walks.walk(()), *(walks.walk((via,)) for via in candidates.tolist())}
+    assert len(alone) > 4
+    while set(evaluations.objectives) != alone:
+        assert local.step(2)
+        assert set(evaluations.objectives) <= alone
+    assert local.step(2)
 
 
 def test_where_no_other_place_is_within_the_length_staying_is_proven():

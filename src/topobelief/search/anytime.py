@@ -93,6 +93,7 @@ class AnytimeSearch:
         self._at_best = 0  # evaluations made when the best value was found
         self._restarts = 0  # of local search, since then
         self._batch = _FIRST_BATCH
+        self._ahead = 0.0  # seconds that local search has had more than the bound; with a deadline each gets half
         self._bounds: list[float] = []  # after each step
 
     @property
@@ -138,9 +139,13 @@ class AnytimeSearch:
                 if len(self._evaluations) >= self._most:
                     self._bound_front()
                     return "evaluations"
+                began = self._clock()
                 moved = self._search_on()
-                if self._is_warm or not moved:
+                half = self._clock()
+                self._ahead += half - began
+                if (self._is_warm and (self._end == math.inf or self._ahead >= 0)) or not moved:
                     moved |= self._bound_on()
+                    self._ahead -= self._clock() - half
                 if not moved:
                     self._bound_front()
                     return "deadline" if self._no_time else "rest"

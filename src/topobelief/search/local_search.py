@@ -70,6 +70,7 @@ class LocalSearch:
         self._yield: dict[int, float] = {}  # most that inserting a via-vertex gained, per metre
         self._left: dict[tuple[Walk, bool], Iterator[list[_Change]]] = {}  # by walk, and whether they are spurs
         self._exhausted: set[tuple[Walk, bool]] = set()
+        self._sweep: Iterator[list[_Change]] | None = None  # each candidate alone as via-vertex, before all else
         self._tried: set[Vias] = set()  # as neighbours
         self._known = 0  # walks that were evaluated when the leaders were chosen
         self._leading: list[Walk] = []  # the best that differ from each other;
@@ -88,6 +89,13 @@ class LocalSearch:
         int
             How many walks were evaluated; 0 when all neighbours of all leaders are known.
         """
+        if self._sweep is None:
+            self._sweep = _batches(iter(self._insertions(())), size)
+        for batch in self._sweep:
+            before = len(self._evaluations)
+            self._try(self._walks.walk(()), batch)
+            if len(self._evaluations) > before:
+                return len(self._evaluations) - before
         return self._evaluate_neighbours(self._leaders(), size)
 
     def widen(self, size: int) -> int:
@@ -178,8 +186,8 @@ class LocalSearch:
         vias = self._walks.vias(walk)
         changes = itertools.chain(
             self._omissions(vias),
-            self._shifts(vias),
             self._insertions(vias),
+            self._shifts(vias),
             self._replacements(vias),
             self._exchanges(vias),
             self._recombinations(walk),
