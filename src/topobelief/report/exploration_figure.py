@@ -12,12 +12,13 @@ from matplotlib.figure import Figure
 
 from topobelief.arrays import FloatArray
 from topobelief.planning.registry import unit_of
-from topobelief.planning.units import shown_factor, shown_unit
+from topobelief.planning.units import quantity, shown_factor, shown_unit
 from topobelief.report import style
 from topobelief.report.canvas import Canvas, Entry, Panel
-from topobelief.report.simulation_tables import exploration_line
 from topobelief.report.study_figures import OBJECTIVE_NAMES
+from topobelief.simulation.exploration import ENOUGH, TRIPS_DRIVEN, UNDECIDED
 from topobelief.simulation.record import Leg, Record
+from topobelief.wording import counted
 
 _LEFT, _BOTTOM, _TOP, _RIGHT = 0.70, 0.50, 0.62, 0.15  # margins, inches, as all lengths here
 _MAP_AREA, _MOST_WIDTH = 22.0, 7.2
@@ -47,7 +48,7 @@ def draw_trips(record: Record) -> Figure:
         key = _draw_tracks(panel, record, legs)
         panel.limits((float(x_min), float(x_max)), (float(y_min), float(y_max)))
         panel.map_axes()
-        canvas.title(_LEFT, below + height + 0.10, _title(record), exploration_line(record))
+        canvas.title(_LEFT, below + height + 0.10, _title(record), _subtitle(record))
         canvas.key(key, _LEFT + width + _GAP, below + height, corner="upper left")
         values = canvas.panel(_LEFT, _BOTTOM, width, _VALUES_HEIGHT)
         canvas.key(_draw_values(values, record, legs), _LEFT + width + _GAP, _BOTTOM + _VALUES_HEIGHT, corner="upper left")
@@ -78,11 +79,11 @@ def _draw_values(panel: Panel, record: Record, legs: Sequence[Leg]) -> list[Entr
     colours = _colours(len(legs))
     for place, (x, colour) in enumerate(zip(at.tolist(), colours, strict=True)):
         panel.line([(x - 0.3, before[place]), (x, before[place]), (x + 0.3, achieved[place])], color=colour, linewidth=1.4)
-    panel.line(_points(at + 0.3, predicted), linestyle="none", marker="x", markersize=5, markeredgecolor=_PREDICTED, zorder=5)
+    panel.line(_points(at + 0.3, predicted), linestyle="none", marker="x", markersize=8, markeredgecolor=_PREDICTED, zorder=5)
     looks: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 4, "markeredgewidth": 0}
     panel.line(_points(at + 0.3, achieved), markerfacecolor=_ACHIEVED, zorder=6, **looks)
     key = [
-        Entry("predicted", linestyle="none", marker="x", markersize=5, markeredgecolor=_PREDICTED),
+        Entry("predicted", linestyle="none", marker="x", markersize=8, markeredgecolor=_PREDICTED),
         Entry("achieved", markerfacecolor=_ACHIEVED, **looks),
     ]
     levels = [*before, *predicted, *achieved]
@@ -102,7 +103,8 @@ def _draw_values(panel: Panel, record: Record, legs: Sequence[Leg]) -> list[Entr
     spare = 0.08 * (high - low) or 0.1 * abs(high) or 1.0
     panel.limits((0.4, float(at[-1]) + 0.6 if len(at) else 1.6), (low - spare, high + spare))
     panel.axes.set(xlabel="trip", ylabel=f"{OBJECTIVE_NAMES[record.options.objective]} ({shown_unit(unit)})")
-    panel.axes.set_xticks([leg.trip for leg in legs])
+    names = [str(leg.trip) for leg in legs]
+    panel.axes.set_xticks(at, [*names, "end"][: len(at)])
     for side in ("right", "top"):
         panel.axes.spines[side].set_visible(False)
     return key
@@ -115,6 +117,20 @@ def _points(x: FloatArray, y: FloatArray) -> FloatArray:
 def _colours(count: int) -> list[Any]:
     """From the first trip to the last."""
     return [colormaps["viridis"](share) for share in np.linspace(0.0, 0.85, count).tolist()]
+
+
+def _subtitle(record: Record) -> str:
+    """How the trips ended, in few words."""
+    found, trips = record.exploration, record.options.trips
+    if found is None or trips is None:
+        return ""
+    unit, after = unit_of(record.options.objective), f"after {counted(found.num_trips, 'trip')}"
+    if found.stopped_by == ENOUGH:
+        return f"enough {after}: proven that no other gains more than {quantity(trips.enough, unit)}"
+    if found.stopped_by in (TRIPS_DRIVEN, UNDECIDED):
+        most = "" if math.isinf(found.most) else f", none gains more than {quantity(found.most, unit)}"
+        return f"ended {after}: the best next one found gains {quantity(max(found.gain, 0.0), unit)}{most}"
+    return f"ended {after}: {found.stopped_by}"
 
 
 def _title(record: Record) -> str:

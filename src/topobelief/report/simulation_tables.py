@@ -73,17 +73,18 @@ def trips_table(record: Record) -> Table:
         box=box.SIMPLE_HEAD,
         padding=(0, 1),
         pad_edge=False,
-        caption=f"{_quantity(record.options.objective)} of the map that stood before each trip, {shown_unit(unit)}",
+        caption=f"before, predicted, achieved: {_quantity(record.options.objective)}, of the poses that stood before the trip, "
+        f"{shown_unit(unit)}",
         caption_justify="left",
     )
     table.add_column("trip", no_wrap=True)
-    for name in ("metres", "closures", "before", "predicted", "achieved", "predicted gain", "achieved gain"):
+    for name in ("metres", "closures", "before", "predicted", "achieved", "gain", "of predicted"):
         table.add_column(name, justify="right", no_wrap=True)
     for leg in record.legs:
         if leg.trip:
             before, predicted, achieved = leg.prior_value, leg.predicted_value, leg.achieved_value
-            values = (before, predicted, achieved, before - predicted, before - achieved)
-            table.add_row(str(leg.trip), f"{leg.distance:.1f}", str(leg.num_closures), *(cell(value, unit) for value in values))
+            values = [cell(value, unit) for value in (before, predicted, achieved, before - achieved, before - predicted)]
+            table.add_row(str(leg.trip), f"{leg.distance:.1f}", str(leg.num_closures), *values)
     return table
 
 

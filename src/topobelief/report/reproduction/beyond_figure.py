@@ -12,6 +12,7 @@ from topobelief.report.canvas import Entry
 from topobelief.report.reproduction.beyond_table import OBJECTIVE_WORDS
 from topobelief.report.reproduction.panels import MARGIN, Grid, light_grid
 from topobelief.reproduction.beyond_candidates import BeyondRow
+from topobelief.wording import counted
 
 _LOOKS = (("#9FB4C7", "o"), (style.ODOMETRY, "s"), (style.BEST, "D"), (style.SURVIVOR, "^"))
 _UNITS = {"error": ("cm", 100.0), "map": ("nats", 1.0)}
@@ -36,8 +37,9 @@ def draw_beyond(rows: Sequence[BeyondRow]) -> Figure:
                 shortest = factor * float(np.median([row.now - row.shortest for row in chosen]))
                 panel.axes.axhline(shortest, color=style.MUTED, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
                 panel.axes.set_xscale("log")
-                panel.axes.set_ylim(bottom=0)
-                panel.axes.margins(0.08, 0.12)
+                most = factor * max(row.gain for row in chosen)
+                panel.axes.set_ylim(-0.05 * most, 1.08 * most)
+                panel.axes.set_xmargin(0.08)
                 light_grid(panel.axes)
                 if column == 0:
                     panel.axes.set_ylabel(f"gain against staying ({unit})")
@@ -46,7 +48,7 @@ def draw_beyond(rows: Sequence[BeyondRow]) -> Figure:
         decisions = len({(row.seed, row.xi) for row in rows})
         grid.headline(
             "The best of some paths, and the best of the whole roadmap",
-            f"S2, learned closures, {decisions} pairs of seed and noise; large marks are medians",
+            f"S2, learned closures, {counted(decisions, 'pair')} of seed and noise; large marks are medians",
         )
         entries = [
             Entry(method, linestyle="none", marker=marker, markersize=6, markerfacecolor=colour, markeredgewidth=0)

@@ -68,7 +68,7 @@ def page(found: Reproduction, figures: Sequence[NamedFigure], pictures: Mapping[
         ),
         choices=_table(choice_cells(found.choices)),
         beyond_lead=escape(
-            f"The second session, {len({(row.seed, row.xi) for row in found.beyond})} pairs of seed and noise: medians of what "
+            f"The second session, {len({(row.seed, row.xi) for row in found.beyond})} of its seeds and noises: medians of what "
             "the way found gains against staying, of the gap that the search leaves, of lengths, and of processor time."
         ),
         beyond=_table(beyond_cells(found.beyond)),
