@@ -153,7 +153,7 @@ def test_where_nothing_is_seen_again_staying_is_the_answer(topobelief, office):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--goal", "0", "5", "--max-length", "5"], "expected max_length of at least 11.5"),
+        (["--goal", "0", "5", "--max-length", "5"], "expected --max-length of at least 11.5"),
         (["--goal", "0", "5", "--max-length", "20", "--candidates", "3"], "got --candidates, which compares a list"),
         (["--goal", "0", "5", "--max-length", "20", "--as-paper"], "got --as-paper, which compares a list"),
         (["--goal", "0", "5", "--max-length", "20", "--max-detour", "2"], "expected one limit of length, got --max-detour too"),
