@@ -32,7 +32,7 @@ from topobelief.runs.journal import Journal
 from topobelief.runs.lock import alone
 from topobelief.runs.run import run_tasks
 from topobelief.search.anytime import SearchProgress
-from topobelief.search.flow_bound import flow_bound
+from topobelief.search.walk_bounds import walk_bounds
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from roadmap_walks import Case, random_case
@@ -143,7 +143,7 @@ def value_found(case: Case, objective: str, optimum: float, turn: float | None =
 def bounded(case: Case, objective: str, least: float) -> tuple[float, float]:
     """By how much any step of the bound exceeds the least value (-inf: there is no walk to bound), and the last bound."""
     try:
-        bound = flow_bound(case.graph, case.roadmap, objective=objective, **case.arguments())
+        bound, _ = walk_bounds(case.graph, case.roadmap, objective=objective, **case.arguments())
     except PlanningError:  # no edge within the length: staying is all there is
         return -np.inf, least
     highest = -np.inf

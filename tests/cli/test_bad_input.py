@@ -71,7 +71,7 @@ def test_plan_refuses_a_disconnected_graph_and_offers_its_largest_part(topobelie
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--drop", "walls"], 'expected drop to be one of "priors", "gps"'),
+        (["--drop", "walls"], 'expected --drop to be one of "priors", "gps"'),
         (["--drop", "robust", "--robust-as-plain"], "expected robust edges to be dropped or read as plain ones, got both"),
         (["--edge2-order", "g2o"], "'--edge2-order'"),
         (["--component", "smallest"], 'expected component to be "all", "largest" or the id of a pose, got \'smallest\''),
@@ -121,10 +121,10 @@ def test_a_goal_behind_walls(topobelief, office, tmp_path):
         (["--start", "nan", "1"], "'--start': expected the id of a pose or X Y in metres, got 'nan 1'"),
         (["--start", "5", "5"], "expected a start in sight of a pose of the graph, got (5, 5)"),
         (["--objective", "fame"], "'--objective'"),
-        (["--proof", "optimal", "--margin", "-50"], "expected a margin or proof"),
+        (["--proof", "optimal", "--margin", "-50"], "expected a margin or --proof optimal, got both"),
         (["--sigma-p", "0.1"], "expected both --sigma-p and --sigma-theta or neither"),
-        (["--objective", "map", "--bounds", "paper", "--sigma-p", "1", "--sigma-theta", "1"], 'use bounds="fischer"'),
-        (["--bounds", "paper"], 'expected bounds of objective "error" to be one of "fischer", "anchored"'),
+        (["--objective", "map", "--bounds", "paper", "--sigma-p", "1", "--sigma-theta", "1"], "use --bounds fischer"),
+        (["--bounds", "paper"], 'expected --bounds of objective "error" to be one of "fischer", "anchored"'),
         (["--along-trajectory"], "expected one of --map FILE and --along-trajectory"),
         (["--bogus"], "No such option: --bogus"),
     ],

@@ -163,7 +163,7 @@ def test_a_trip_too_short_for_any_other_place_is_proven_to_gain_nothing(topobeli
     ("options", "message"),
     [
         (["--goal", "0", "99", "--max-length", "50"], "expected a goal on the map"),
-        (["--goal", "0", "5", "--max-length", "5"], "expected max_length of at least 11.5"),
+        (["--goal", "0", "5", "--max-length", "5"], "expected --max-length of at least 11.5"),
         (["--goal", "0", "5", "--max-length", "20", "--candidates", "3"], "got --candidates, which compares a list"),
         (["--goal", "0", "5", "--max-length", "20", "--as-paper"], "got --as-paper, which compares a list"),
         (["--goal", "0", "5", "--max-length", "20", "--max-detour", "2"], "expected one limit of length, got --max-detour too"),

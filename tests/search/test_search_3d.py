@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from topobelief.search.flow_bound import flow_bound
 
 import topobelief as tb
 from drives_3d import flight, ramp, roadmap_in_space
 from roadmap_walks import Case
+from topobelief.search.walk_bounds import walk_bounds
 
 
 def case(seed: int) -> Case:
@@ -29,7 +29,7 @@ def test_no_walk_is_better_than_the_bound(seed, objective):
     walks = given.walks()
     assert len(walks) > 3
     best = float(given.values(objective, walks).min())
-    bound = flow_bound(given.graph, given.roadmap, objective=objective, **given.arguments())
+    bound, _ = walk_bounds(given.graph, given.roadmap, objective=objective, **given.arguments())
     for _ in range(4):
         bound.step()
         assert bound.lower_bound <= best + 1e-9 * max(1, abs(best))
