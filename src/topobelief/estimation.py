@@ -184,8 +184,8 @@ class _Problem:
             before.append(chi2)
         if not self.linear and len(before) > _PATIENCE and before[-_PATIENCE] - chi2 <= _FLAT * chi2:
             warnings.warn(
-                f"chi^2 = {chi2:.6g} fell by less than {100 * _FLAT:g} % in the last {_PATIENCE} of {max_iterations} "
-                "iterations: ranges or bearings leave a flat valley, along which the estimate may still move",
+                f"chi^2 = {chi2:.6g} fell by less than {100 * _FLAT:g} % in {_PATIENCE} of {max_iterations} iterations: "
+                "ranges or bearings leave a flat valley, along which the estimate may still move",
                 NotOptimizedWarning,
                 stacklevel=3,
             )

@@ -200,3 +200,20 @@ def test_what_cannot_be_is_refused(topobelief, office, tmp_path, options, messag
     assert (outcome.code, outcome.err.count("\n")) == (2, 1)
     assert message in outcome.err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_landmarks_are_counted_and_their_graph_described(topobelief, tmp_path):
+    path = tmp_path / "graph.g2o"
+    path.write_text(
+        "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nEDGE_SE2 0 1 1 0 0 9 0 0 9 0 9\nVERTEX_XY 2 1 1\n"
+        "EDGE_SE2_XY 0 2 1 1 4 0 4\nEDGE_SE2_XY 1 2 0 1 4 0 4\n"
+    )
+    found = facts(topobelief, path)
+    assert (found["num_poses"], found["num_landmarks"], found["num_observations"]) == (2, 1, 2)
+    assert found["bounds_fischer_cholesky"]["lower"] <= found["joint_entropy"] + 1e-9
+    assert found["bounds_paper_cholesky"] is None
+    shown = topobelief(["info", str(path), "--picture", str(tmp_path / "graph.png")]).out
+    assert "do not apply: they need poses alone" in shown
+    assert (tmp_path / "graph.png").exists()
+    converted = topobelief(["convert", str(path), str(tmp_path / "again.g2o")])
+    assert "2 poses, 1 landmark, 3 edges." in converted.out

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from topobelief.arrays import BoolArray
-from topobelief.graph.action import Action
+from topobelief.graph.action import Action, landmark_ends
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.wording import closures_in_words
+from topobelief.wording import closures_in_words, counted
 
 _GAP = 3  # poses; one stretch goes on across fewer that are not seen
 
@@ -77,3 +77,11 @@ def described(graph: PoseGraph, stretches: Sequence[Stretch], *, most: int = 3) 
     one = len(stretches) == 1 and stretches[0].first == stretches[0].last
     closures = closures_in_words(sum(each.num_closures for each in stretches), sum(each.expected for each in stretches))
     return f"sees pose{'' if one else 's'} {listed} again, {closures}"
+
+
+def observed(graph: PoseGraph, action: Action) -> str:
+    """Landmarks that an action observes, in words to be added: ", may observe 3 landmarks 17 times"; nothing without any."""
+    seen = action.edges[landmark_ends(graph, action.edges), 1]
+    if not len(seen):
+        return ""
+    return f", may observe {counted(len(np.unique(seen)), 'landmark')} {counted(len(seen), 'time')}"

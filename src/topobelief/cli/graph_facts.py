@@ -191,7 +191,8 @@ def _topology(graph: PoseGraph) -> Iterator[Fact]:
         exact = von_neumann_entropy(topology)
         yield Fact("von_neumann_entropy", exact, "s_VN, von Neumann entropy", f"{exact:.4f}")
     else:
-        text = f"not computed: some {expected_spectrum_seconds(size):.0f} s for the spectrum of {size} nodes"
+        nodes = "nodes" if graph.num_landmarks else "poses"
+        text = f"not computed: some {expected_spectrum_seconds(size):.0f} s for the spectrum of {size} {nodes}"
         yield Fact("von_neumann_entropy", None, "s_VN, von Neumann entropy", text)
     degrees = von_neumann_entropy_approx(topology)
     yield Fact("von_neumann_entropy_approx", degrees, "ŝ_VN, the same by degrees", f"{degrees:.4f}")

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from topobelief.candidates.seen_again import described, seen_again
+from topobelief.candidates.seen_again import described, observed, seen_again
 from topobelief.candidates.start import Start
 from topobelief.cli.console import Reporter
 from topobelief.cli.plan_candidates import Proposals
@@ -34,7 +34,7 @@ def reasons(
     """
     claim = "chosen: the best way found" if searched else _claim(decision)
     return [
-        f"{decision.name(index)} {described(graph, seen_again(graph, start.pose, action))}"
+        f"{decision.name(index)} {described(graph, seen_again(graph, start.pose, action))}{observed(graph, action)}"
         f"{_gain(decision, index, errors)}; {_standing(decision, index, claim)}"
         for index, action in enumerate(proposals.actions)
     ]
