@@ -80,6 +80,14 @@ def test_a_plane_saved_in_3d_is_projected(topobelief, tmp_path):
     assert "x_y_yaw" in json.loads((tmp_path / "out" / "decision.json").read_text())["chosen"]
 
 
+def test_info_says_whether_a_place_on_a_floor_is_free(topobelief, garage):
+    outcome = topobelief(["info", str(garage), "--goal", "10", "0", "0.5", "--goal", "0", "0", "1.5", "--no-optimize"])
+    assert outcome.code == 0, outcome.err
+    assert "goal (10.00, 0.00, 0.50)" in outcome.out
+    assert "free, " in outcome.out
+    assert "the nearest free place is " in " ".join(outcome.out.split())
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [

@@ -100,6 +100,12 @@ def test_mutated_clouds_are_read_or_refused(tmp_path, name):
         assert points.shape[1:] == (3,)
 
 
+def test_a_signalling_nan_is_a_missing_point(tmp_path):
+    data = ply("binary_little_endian").replace(struct.pack("<f", 3), b"\x01\x00\xa0\x7f")
+    (tmp_path / "le.ply").write_bytes(data)
+    assert np.isnan(read_point_cloud(tmp_path / "le.ply")).any(axis=1).tolist() == [False, True, False]
+
+
 class TestGrids:
     @pytest.mark.parametrize(
         ("cells", "free"),

@@ -23,7 +23,8 @@ def describe_goals(graph: PoseGraph, world: FreeSpace, goals: Sequence[Goal], ro
         text, place = f"free, {where}", goal_place
         if not free:
             place = nearest_free_place(world, goal_place, robot_radius, reachable_from=seen_by(world, graph.positions[-1]))
-            nearest = "there is no free place" if place is None else f"the nearest free place is {place[0]:g} {place[1]:g}"
+            numbers = "" if place is None else " ".join(f"{coordinate:g}" for coordinate in place.tolist())
+            nearest = f"the nearest free place is {numbers}" if numbers else "there is no free place"
             text = f"not free for a robot of radius {robot_radius:g} m, {where}; {nearest}"
         nearest_free = None if place is None else place.tolist()
         found.append({"place": goal_place.tolist(), "free": free, "clearance": clearance, "nearest_free": nearest_free})

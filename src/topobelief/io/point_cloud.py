@@ -175,4 +175,5 @@ def _binary(
         {"names": list("xyz"), "formats": [types[k] for k in columns], "offsets": starts[columns].tolist(), "itemsize": size}
     )
     points = np.frombuffer(body, dtype=record, count=count)
-    return np.column_stack([points[axis].astype(np.float64) for axis in "xyz"]).reshape(-1, 3)
+    with np.errstate(invalid="ignore"):  # of signalling nan
+        return np.column_stack([points[axis].astype(np.float64) for axis in "xyz"]).reshape(-1, 3)

@@ -115,9 +115,9 @@ class World3D:
                 "choose a larger resolution, or remove points that are far away"
             )
         free = np.ones(sides.astype(np.int64), dtype=bool)
-        cells = np.floor((array - low) / resolution).astype(np.int64)
+        cells = np.floor((array - low) / resolution)
         inside = ((cells >= 0) & (cells < free.shape)).all(axis=1)
-        free[tuple(cells[inside].T)] = False
+        free[tuple(cells[inside].astype(np.int64).T)] = False
         return cls(Voxels(free, resolution, low))
 
     @classmethod
