@@ -226,7 +226,7 @@ def test_the_result_grows_part_by_part_and_goes_into_json(tmp_path):
         len(result.sessions) + len(result.memory) + len(result.error_bounds) + len(result.proofs) + len(result.candidates)
         for result in results
     ]
-    assert counts == [0, 1, 2, 3, 4, 5, 6, 15, 26]
+    assert counts == [0, 1, 2, 3, 4, 5, 6, 15, 27]
     document = json.loads(json.dumps(results[-1].to_dict(), allow_nan=False))
     assert document["schema"] == run.SCHEMA
     assert document["plan"]["files"] == ["drive.g2o"]
