@@ -82,8 +82,8 @@ def _free_cells(path: StrPath, unknown: Unknown) -> BoolArray:
         raise FileError(path, f"expected a grid of numbers of shape (nx, ny, nz), got {cells.dtype} of {cells.shape}")
     if cells.dtype.kind == "b":
         return ~np.asarray(cells)
-    values = np.asarray(cells, dtype=np.float64)
     with np.errstate(invalid="ignore"):
+        values = np.asarray(cells, dtype=np.float64)
         not_known = np.isnan(values) | (values < 0)
         values = values / 100 if values.max(initial=0.0, where=~not_known) > 1 else values
         free = values < _OCCUPIED
