@@ -6,7 +6,7 @@ PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3; do command 
 BIN := .venv/bin
 STAMP := .venv/.installed
 
-.PHONY: install demo test test-ros check bench clean
+.PHONY: install demo docs test test-ros check bench clean
 
 install: $(STAMP)
 
@@ -24,6 +24,10 @@ $(STAMP): pyproject.toml constraints.txt
 demo: install
 	$(BIN)/topobelief plan examples/office/recorded.g2o --map examples/office/recorded.yaml --goal 25 -2.95 \
 	  --max-detour 1.6 --seconds 10 --out out/demo
+
+docs: install
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	@echo "open out/site/index.html"
 
 test: install
 	$(BIN)/python -m pytest -n auto

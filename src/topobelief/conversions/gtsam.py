@@ -94,7 +94,8 @@ def _factors_and_values(graph: PoseGraph, *, first_pose: int, first_edge: int) -
     for node, key in enumerate(keys[first_pose:], start=first_pose):
         pose = graph.poses[node]
         values.insert(key, np.array(pose[:k]) if graph.is_landmark[node] else _to_pose(gtsam, pose.tolist()))
-    edges, measurements = graph.edges[first_edge:].tolist(), graph.measurements[first_edge:].tolist()
+    edges: list[tuple[int, int]] = graph.edges[first_edge:].tolist()
+    measurements = graph.measurements[first_edge:].tolist()
     readings = graph.readings[first_edge:].tolist()
     for e, ((i, j), measured, matrix, reading) in enumerate(zip(edges, measurements, information, readings, strict=True)):
         if reading == RELATIVE_POSE:
