@@ -40,7 +40,7 @@ _CONVERGED = 1e-10  # fall of chi^2 that the linear model still promises: 1e-5 s
 _ROUNDED, _ROUNDED_RELATIVE = 1e-6, 1e-12  # the same and a share of chi^2, where rounding lets it fall no more
 _SUFFICIENT = 1e-4  # share of the promised fall that a step must bring (Nocedal and Wright, section 3.1)
 _SHORTEST_STEP = 2.0**-20
-_PATIENCE, _FLAT = 50, 2e-3  # iterations, and share of chi^2: ranges alone may lead along a valley that is all but flat
+_PATIENCE, _FLAT = 50, 1e-2  # iterations, and share of chi^2: ranges alone may lead along a valley that is all but flat
 _SMALL_ANGLE = 1e-3  # below it the series of the Jacobian is exact in double precision
 
 
