@@ -26,7 +26,7 @@ demo: install
 	  --max-detour 1.6 --seconds 10 --out out/demo
 
 docs: install
-	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 	@echo "open out/site/index.html"
 
 test: install

@@ -1,4 +1,4 @@
-"""What the site adds to the pages of docs/: two pages of reference, and formulas as MathML, which browsers draw by themselves."""
+"""What the site adds to the pages of docs/: two pages of reference, and formulas as MathML, which browsers draw themselves."""
 
 from __future__ import annotations
 
@@ -144,7 +144,8 @@ def formula(tex: str, display: str) -> str:
     drawn = re.sub(
         r"<(m[io])(?: movablelimits=\"true\")?>([A-Za-z]{2,})</\1>", r'<mo lspace="0.15em" rspace="0.1em">\2</mo>', drawn
     )
-    return re.sub(r"<mo>(&#x0(?:2016|007C);)</mo>", r'<mo stretchy="false">\1</mo>', drawn)
+    bar = r'<mo stretchy="false" lspace="0" rspace="0">\1</mo>'
+    return re.sub(r'<mo(?: stretchy="false")?>(&#x0(?:2016|007C);)</mo>', bar, drawn)
 
 
 def relation(entity: str) -> str:

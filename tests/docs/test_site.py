@@ -20,12 +20,15 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_the_site_builds_strictly_with_every_public_name_and_command(tmp_path):
-    """Strictly: a link or an anchor that leads nowhere, or a page that the navigation leaves out, fails the build."""
+    """Strictly: a link or an anchor that leads nowhere, or a page that the navigation leaves out, fails the build.
+
+    Not quietly: with `--quiet` MkDocs counts no warnings, and a strict build never fails.
+    """
     environment = os.environ | {"PYTHONPATH": str(ROOT / "src"), "NO_MKDOCS_2_WARNING": "1"}
-    build = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path)]
+    build = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path)]
     done = subprocess.run(build, cwd=ROOT, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    assert done.stderr == ""
+    assert "WARNING" not in done.stderr
     pages = {page.name: page.read_text(encoding="utf-8") for page in tmp_path.glob("*.html")}
 
     stub = (ROOT / "src" / "topobelief" / "__init__.pyi").read_text(encoding="utf-8")
