@@ -117,7 +117,7 @@ def test_the_search_beside_its_peers_is_kept_and_continued(tmp_path, capsys):
         (["--seeds", "2"], "expected --search together with --seeds, got --seeds alone"),
         (["no-such.g2o"], "no-such.g2o: expected a pose graph to read"),
         (["--sizes", "many"], 'expected --sizes as whole numbers by commas, such as 1000,10000, got "many"'),
-        (["--sizes", "1"], "expected sizes of at least 2, got 1"),
+        (["--sizes", "1"], "expected --sizes of at least 2, got 1"),
         (["--candidates", "1"], "--candidates"),
     ],
 )

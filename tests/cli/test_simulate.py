@@ -121,11 +121,11 @@ def test_an_interrupted_run_can_be_resumed(topobelief, room, tmp_path, monkeypat
         (["office", "--strategy", "best"], "expected a strategy of spanning_trees"),
         (["office", "--strategy", ""], "expected a strategy of spanning_trees"),
         (["office", "--closures", "all"], "'all' is not one of"),
-        (["office", "--noise", "loud"], "expected noise as"),
+        (["office", "--noise", "loud"], "expected --noise as"),
         (["office", "--max-detour", "0.5"], "expected a detour limit of at least 1"),
         (["office", "--explore"], "expected --max-length M with --explore"),
         (["office", "--trips", "3"], "expected --trips together with --explore"),
-        (["office", "--explore", "--max-length", "-1"], "expected trips of a finite length above 0 m, got -1"),
+        (["office", "--explore", "--max-length", "-1"], "expected --max-length as a finite number of metres above 0, got -1"),
         (["office", "--displaced", "0.3"], "--displaced together with --resume"),
         (["office", "--resume", "--out", "nowhere"], "run.json: expected a file to read"),
         (["nowhere.yaml"], "nowhere.yaml: expected a file to read"),
@@ -191,7 +191,7 @@ def test_physical_noise_cannot_be_redrawn(topobelief, room):
 def test_what_cannot_be_compared_is_one_line(topobelief, room):
     outcome = topobelief(["simulate-compare", str(room), "--strategies", "shortest,spanning_trees:entropy"])
     assert outcome.code == 2
-    assert 'expected objective to be one of "joint"' in outcome.err
+    assert 'expected --objective to be one of "joint"' in outcome.err
     assert outcome.err.count("\n") == 1
 
 

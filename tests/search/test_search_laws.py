@@ -15,7 +15,7 @@ from roadmap_walks import Case, plan_of, random_case
 from topobelief.candidates.roadmap import Roadmap
 from topobelief.search.information_gain import gain
 from topobelief.search.plans import Background, Mixture
-from topobelief.search.reduced_prior import reduced_prior
+from topobelief.search.reduced_prior import ReducedPrior
 from topobelief.search.result import SearchResult
 
 OBJECTIVES = ("error", "map", "joint", "per_pose")
@@ -133,7 +133,7 @@ def test_along_a_segment_between_walks_the_gain_is_concave_and_exact_at_its_ends
         return
     n = case.graph.num_poses
     seen = np.unique(np.concatenate([[0, n - 1], *(action.edges[action.num_new_poses :, 1] for action in actions)]))
-    prior = reduced_prior(
+    prior = ReducedPrior(
         case.graph, n - 1, seen, case.information, probability=case.rule.probability, min_index_gap=2, with_errors=True
     )
     plans = [plan_of(case.graph, action, seen, num_idle=most - action.num_new_poses) for action in actions]

@@ -121,9 +121,10 @@ def benchmark(
         return
     from topobelief.cli.console import Reporter
     from topobelief.cli.extras import require_extras
-    from topobelief.cli.plan_files import checked_folder
 
     require_extras("fast", "gtsam")
+    from topobelief.cli.plan_files import checked_folder
+
     reporter, folder = Reporter(as_json=as_json), checked_folder(out)
     with reporter.stage("start-up"):
         from topobelief.benchmark.run import BenchmarkPlan, BenchmarkResult, run_benchmark

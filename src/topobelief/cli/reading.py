@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from topobelief.io.reading import ReadingOptions
 
 # The readers' own choices, repeated so that help need not load them; a test holds them together.
-Edge2Order = Literal["toro", "isam", "isam_root"]
+Edge2Order = Literal["toro", "isam", "isam_root", "covariance"]
 
 _READING = "Reading the graph"
 
@@ -36,7 +36,7 @@ Edge2OrderOption = Annotated[
     Edge2Order,
     typer.Option(
         metavar="NAME",
-        help="Order of information entries in EDGE2 lines: toro, isam, or isam_root (of its square root).",
+        help="What entries of EDGE2 lines are: information as toro or isam orders it, its root (isam_root), or a covariance.",
         rich_help_panel=_READING,
     ),
 ]

@@ -12,11 +12,11 @@ import numpy as np
 from topobelief.arrays import FloatArray, IntArray
 from topobelief.search.bound import WalkBound
 from topobelief.search.evaluations import SAME_VALUE, Evaluations
-from topobelief.search.front_bounds import FrontBounds
 from topobelief.search.local_search import LocalSearch
 from topobelief.search.walks import Walk
 
 if TYPE_CHECKING:
+    from topobelief.search.front_bounds import FrontBounds  # needs numba, which a plan of candidates does without
     from topobelief.search.result import SearchResult
 
 Reason = Literal["proof", "gap", "enough", "deadline", "evaluations", "interrupt", "rest"]

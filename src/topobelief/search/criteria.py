@@ -130,7 +130,7 @@ class Criterion:
         if left == 0:
             return np.zeros(len(ahead))
         share = 1 + ahead / left
-        some = np.maximum(share, np.finfo(float).tiny)
+        some = np.where(share > 0, share, 1.0)
         value = np.sqrt(left / some) if self.kind == "error" else self.start - gain - left * np.log(some)
         return np.where(share <= 0, math.inf, value)
 

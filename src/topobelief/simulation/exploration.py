@@ -45,7 +45,7 @@ class TripOptions:
 
     def __post_init__(self) -> None:
         if not 0 < self.max_length < math.inf:
-            raise InvalidInputError(f"expected trips of a finite length above 0 m, got {self.max_length:g}")
+            raise InvalidInputError(f"expected max_length as a finite number of metres above 0, got {self.max_length:g}")
         if not 0 <= self.enough < math.inf:
             raise InvalidInputError(f"expected a finite gain of at least 0 to be enough, got {self.enough:g}")
         if self.max_trips < 0:

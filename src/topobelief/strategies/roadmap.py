@@ -43,6 +43,7 @@ def roadmap(name: str, question: Question) -> Answer:
             spacing=rule.spacing,
             information=rule.information,
             max_evaluations=_MOST_EVALUATIONS,
+            refine=True,
             seed=rule.seed,
         )
     (action,) = predict_along(question.graph, ground.world, [found.path], rule)

@@ -32,7 +32,8 @@ from topobelief.world import World
 _Entry = TypeVar("_Entry")
 _NO_LIMIT = ("none", "inf", ".inf")
 _VARIED = ("num_paths", "seed", "information")  # by session, seed and noise
-_CANDIDATE_KEYS = tuple(field.name for field in fields(CandidateRule) if field.name not in (*_VARIED, "closures"))
+_NOT_STATED = ("closures", "observations", "attitude")  # by other keys, learned, and for planes alone
+_CANDIDATE_KEYS = tuple(field.name for field in fields(CandidateRule) if field.name not in (*_VARIED, *_NOT_STATED))
 _LEARNED, _BY_HAND = "learned", "by hand"
 _CLOSURE_KEYS = ("closure_radius", "closure_angle", "min_index_gap")  # of a rule by hand
 
