@@ -241,6 +241,7 @@ def test_each_via_vertex_is_tried_alone_before_any_two():
 
 def test_where_no_other_place_is_within_the_length_staying_is_proven():
     graph, roadmap = scene(3)
+    assert search(graph, roadmap, max_length=0.0).path.tolist() == [roadmap.vertices[0].tolist()]
     result = search(graph, roadmap, max_length=1e-3, turn=None)
     assert result.path.tolist() == [roadmap.vertices[0].tolist()]
     assert (result.stopped_by, result.proven_optimal, result.gap) == ("proof", True, 0.0)

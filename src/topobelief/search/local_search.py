@@ -35,6 +35,7 @@ _NUM_LEADERS = 10
 _NUM_SHORTER = 6  # leaders at shorter lengths
 _DIFFERENT = 0.1  # share of the length limit by which leaders differ (Fréchet)
 _LEAST_EXTRA = 0.02  # share of the length limit that an insertion counts as at least
+_ONE_PLACE = 1e-6  # metres; where the limit is 0
 _NUM_NEAR = 8  # vertices near a via-vertex that may replace it
 _BATCHES_PER_CLIMB = 2  # of the neighbours of a walk, while climbing from a new start
 _MOST_COMPARED = 250  # walks among which leaders are looked for
@@ -159,7 +160,7 @@ class LocalSearch:
         value, length = self._evaluations.value(leader), self._evaluations.lengths[leader]
         for change, walk in zip(batch, walks, strict=True):
             if change.inserted is not None:
-                metres = max(self._evaluations.lengths[walk] - length, _LEAST_EXTRA * self._walks.max_length)
+                metres = max(self._evaluations.lengths[walk] - length, _LEAST_EXTRA * self._walks.max_length, _ONE_PLACE)
                 gain = (value - self._evaluations.value(walk)) / metres
                 self._yield[change.inserted] = max(gain, self._yield.get(change.inserted, -np.inf))
 
