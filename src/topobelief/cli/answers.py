@@ -6,8 +6,10 @@ import math
 import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from threading import Lock
 
 import numpy as np
 
@@ -22,7 +24,7 @@ from topobelief.candidates.start import Start
 from topobelief.cli import plan_candidates, plan_certificate, plan_errors, plan_reasons, plan_search
 from topobelief.cli.console import Reporter
 from topobelief.cli.plan_ends import Goal, shown
-from topobelief.errors import NotOptimizedWarning
+from topobelief.errors import NotOptimizedWarning, PlanningError
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.path_formats import path_text
 from topobelief.page.desk import Publish
@@ -41,6 +43,7 @@ from topobelief.world import World
 
 _FIRST = 0.05  # seconds of search before the first answer
 _LATER = 3.0  # times as many before the next
+_LARGE = 2000  # poses from which on these take longer than the rest of an answer
 _POINTS = 24  # of the front
 _FORMATS = ("csv", "tum", "yaml")
 
@@ -72,6 +75,8 @@ class Answers:
     max_detour: float
     seconds: float
     max_evaluations: int | None = None
+    _planners: dict[tuple[str, str], Planner] = field(default_factory=dict[tuple[str, str], Planner], repr=False)
+    _lock: Lock = field(default_factory=Lock, repr=False)
 
     def __call__(self, question: Question, publish: Publish, unwanted: Callable[[], bool]) -> None:
         """Answer a question, better and better until the time is up, it is proven, or nobody waits."""
@@ -81,6 +86,17 @@ class Answers:
                 publish(self._compared(question))
             else:
                 self._search(question, publish, unwanted)
+
+    def continuing(self, earlier: Answers | None) -> Answers:
+        """These answers, with planners and, in the same world, the roadmap taken over from those of an earlier situation."""
+        if earlier is None:
+            return self
+        for key, planner in earlier._planners.copy().items():
+            self._planners[key] = planner.extended(self.graph)
+        if earlier.world is self.world:
+            with suppress(PlanningError):  # where the old roadmap does not lead to the new start
+                self.__dict__["roadmap"] = earlier.roadmap.between(self.start.place, earlier.roadmap.vertices[1])
+        return self
 
     @cached_property
     def models(self) -> Mapping[str, ClosureModel]:
@@ -130,18 +146,25 @@ class Answers:
             spacing=self.rule.spacing,
             information=self.rule.information,
             start=self.start,
+            planner=self._planner(question.objective, "auto"),
             seed=self.rule.seed,
             on_progress=told,
         )
-        publish(self._found(question, found, limits))
+        publish(self._found(question, found, limits, final=True))
 
-    def _found(self, question: Question, found: SearchResult, limits: plan_search.Limits) -> Mapping[str, object]:
-        """What a search has found so far."""
+    def _found(
+        self, question: Question, found: SearchResult, limits: plan_search.Limits, *, final: bool = False
+    ) -> Mapping[str, object]:
+        """What a search has found so far; on a large graph, errors in centimetres come with the last answer."""
         goals = _goals(question)
         searched = plan_search.gathered([found], goals, points=_POINTS)
         planner = self._planner(question.objective, "auto")
         decision = plan_search.decide(planner, searched)
-        errors = plan_errors.expected(self.graph, searched.proposals, decision, Reporter(as_json=True, shows_progress=False))
+        errors = plan_errors.PlanErrors(searched.proposals.shortest(decision.best), None, None, None)
+        if final or self.graph.num_poses < _LARGE:
+            errors = plan_errors.expected(
+                self.graph, searched.proposals, decision, Reporter(as_json=True, shows_progress=False)
+            )
         names = {name: place for place, name in searched.names.items()}
         front = [
             {"metres": length, "value": value, "way": way}
@@ -183,7 +206,13 @@ class Answers:
         }
 
     def _planner(self, objective: str, family: str) -> Planner:
-        return Planner(self.graph, objective=objective, signature=default_signature(objective), bounds=family)
+        """One for each, so that the prior is factored once."""
+        with self._lock:
+            if (objective, family) not in self._planners:
+                signature = default_signature(objective)
+                planner = Planner(self.graph, objective=objective, signature=signature, bounds=family, engine="incremental")
+                self._planners[objective, family] = planner
+            return self._planners[objective, family]
 
     def _ways(
         self,

@@ -70,7 +70,8 @@ def ros(
         graph, world = plan_world.read_planar(choice, graph_file, reporter, optimized=True, reading=ReadingOptions())
     rule = CandidateRule(num_vertices=vertices, robot_radius=robot_radius, seed=seed, spacing=spacing or 1.0)
 
-    def answers(situation: Situation) -> Answerer:
-        return Answers(situation.graph, situation.world, situation.start, rule, max_detour, seconds)
+    def answers(situation: Situation, earlier: Answerer | None) -> Answerer:
+        new = Answers(situation.graph, situation.world, situation.start, rule, max_detour, seconds)
+        return new.continuing(earlier if isinstance(earlier, Answers) else None)
 
     node.run(Belief((sigma_p, sigma_theta), graph=graph, world=world), answers, context.args)

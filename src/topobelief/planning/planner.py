@@ -164,6 +164,11 @@ class Planner:
         return anchor
 
     @property
+    def objective(self) -> str:
+        """Name of what is minimised."""
+        return self._criteria.objective
+
+    @property
     def graph(self) -> PoseGraph:
         """The prior."""
         return self._graph

@@ -39,8 +39,8 @@ PARAMETERS: Mapping[str, Any] = {
 }
 """The node's own parameters and their defaults; whatever else a decision depends on is an option of `topobelief ros`."""
 
-Answers = Callable[[Situation], Answerer]
-"""Makes what answers questions about a situation."""
+Answers = Callable[[Situation, Answerer | None], Answerer]
+"""Makes what answers questions about a situation, from what answered those about the one before."""
 
 
 def run(belief: Belief, answers: Answers, arguments: list[str]) -> None:
@@ -247,7 +247,8 @@ class _Desk:
 
         try:
             if self._answerer is None or self._answerer[0] != situation.number or self._moved(situation):
-                self._answerer = situation.number, self._make_answers(situation)
+                earlier = None if self._answerer is None else self._answerer[1]
+                self._answerer = situation.number, self._make_answers(situation, earlier)
             self._answerer[1](question, publish, lambda: number != self._asked)
         except TopobeliefError as error:
             answer = {"error": str(error)}

@@ -79,6 +79,7 @@ def search_roadmap(
     earlier: SearchResult | None = None,
     refine: bool = False,
     metric: bool = True,
+    planner: Planner | None = None,
     seed: int = 0,
     on_progress: Callable[[SearchProgress], None] | None = None,
     clock: Callable[[], float] = time.monotonic,
@@ -133,6 +134,8 @@ def search_roadmap(
     metric
         False: topological planning. What is minimised and bounded is the objective as its signature estimates it, from topology
         and weights alone: for "error" by effective resistance, for "map" and "joint" by spanning trees.
+    planner
+        One of this graph and objective that has been used before, so that the prior need not be factored again.
     seed
         The same seed gives the same result, unless a deadline is set.
     on_progress
@@ -166,8 +169,11 @@ def search_roadmap(
     walks = _walks_within(roadmap, goal, max_detour, max_length, return_to_start)
     if not metric:
         require_choice("objective of the topological form", objective, OBJECTIVES)
-    engine = "incremental" if find_spec("numba") else "scratch"
-    planner = Planner(graph, objective=objective, signature=default_signature(objective), engine=engine)
+    if planner is None:
+        engine = "incremental" if find_spec("numba") else "scratch"
+        planner = Planner(graph, objective=objective, signature=default_signature(objective), engine=engine)
+    elif planner.graph is not graph or planner.objective != objective:
+        raise InvalidInputError("expected a planner of this graph and objective, got another; leave it out")
     model = learn_closures(graph, world=world) if closures is None else closures
     seeing = learn_observations(graph, world=world) if observations is None else observations
     of_odometry, of_closures = (
