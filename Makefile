@@ -49,7 +49,7 @@ clean:
 ROS := .venv-ros/bin
 $(ROS)/.installed: pyproject.toml constraints-ros.txt
 	test -x $(ROS)/python || python3.11 -m venv .venv-ros
-	$(ROS)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -r constraints-ros.txt -e '.[fast]' pytest
+	$(ROS)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -r constraints-ros.txt -e '.[fast]' hypothesis pytest
 	touch $@
 
 test-ros: install

@@ -76,7 +76,7 @@ def test_an_interrupt_during_the_search_ends_the_run_and_leaves_it_complete(room
 def test_what_trips_cannot_be():
     for wrong, message in (
         ({"max_length": 0.0}, "metres above 0, got 0"),
-        ({"max_length": math.inf}, "finite length"),
+        ({"max_length": math.inf}, "finite number"),
         ({"max_length": 1.0, "enough": -1.0}, "gain of at least 0"),
         ({"max_length": 1.0, "max_trips": -1}, "at least 0 trips"),
     ):
