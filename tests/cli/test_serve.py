@@ -189,7 +189,7 @@ def test_a_port_that_is_taken_and_a_world_that_is_not_said_are_errors(office: An
     files = [str(office.graph_file), "--map", str(office.map_file)]
     taken = topobelief(["serve", *files, "--vertices", "50", "--port", str(served.server_address[1])])
     assert (taken.code, len(taken.err.splitlines())) == (2, 1)
-    assert "choose another --port" in taken.err
+    assert "choose another --host or --port" in taken.err
     nowhere = topobelief(["serve", str(office.graph_file)])
     assert nowhere.code == 2
     assert "--along-trajectory" in nowhere.err

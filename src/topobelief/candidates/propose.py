@@ -159,10 +159,15 @@ def propose(graph: PoseGraph, world: FreeSpace, start: ArrayLike | Start, goal: 
     return predict_candidates(graph, world, routes, rule, start=start if isinstance(start, Start) else None)
 
 
-def find_routes(world: FreeSpace, start: ArrayLike | Start, goal: ArrayLike, rule: CandidateRule) -> Routes:
-    """The paths of `propose`, which depend on the world alone."""
+def find_routes(
+    world: FreeSpace, start: ArrayLike | Start, goal: ArrayLike, rule: CandidateRule, *, roadmap: Roadmap | None = None
+) -> Routes:
+    """The paths of `propose`, which depend on the world alone; on a roadmap that is there already, start and goal join it."""
     place = start.place if isinstance(start, Start) else start
-    roadmap = build_roadmap(world, place, goal, rule.num_vertices, rule.robot_radius, rule.seed)
+    if roadmap is None:
+        roadmap = build_roadmap(world, place, goal, rule.num_vertices, rule.robot_radius, rule.seed)
+    else:
+        roadmap = roadmap.between(place, goal)
     return Routes(roadmap, diverse_paths(roadmap, place, goal, rule.num_paths, rule.max_detour, rule.seed))
 
 

@@ -15,6 +15,7 @@ from topobelief.arrays import FloatArray
 from topobelief.candidates.homotopy import count_classes
 from topobelief.candidates.polyline import checked_path, path_length
 from topobelief.candidates.propose import CandidateRule, Routes, find_routes, predict_along
+from topobelief.candidates.roadmap_graph import Roadmap
 from topobelief.candidates.start import Start
 from topobelief.cli.console import Reporter
 from topobelief.cli.plan_ends import Goal, shown
@@ -72,6 +73,7 @@ def find_proposals(
     reporter: Reporter,
     *,
     cost_per_metre: float = 0.0,
+    roadmap: Roadmap | None = None,
 ) -> Proposals:
     """Diverse paths from the start to each goal and the paths of files, with the measurements that each would add.
 
@@ -85,7 +87,7 @@ def find_proposals(
     ways = [_from_file(world, begin, file, goals, rule.robot_radius) for file in files]
     with reporter.stage("paths"):
         for number, goal in enumerate(goals):
-            ways += [_Way(path, number, "") for path in find_candidates(graph, world, begin, goal, rule, reporter)]
+            ways += [_Way(path, number, "") for path in find_candidates(graph, world, begin, goal, rule, reporter, roadmap)]
     ways.sort(key=lambda way: path_length(way.path))
     with reporter.stage("measurements"):
         actions = predict_along(graph, world, [way.path for way in ways], rule, start=begin)
@@ -99,11 +101,17 @@ def find_proposals(
 
 
 def find_candidates(
-    graph: PoseGraph, world: FreeSpace, begin: Start, goal: Goal, rule: CandidateRule, reporter: Reporter
+    graph: PoseGraph,
+    world: FreeSpace,
+    begin: Start,
+    goal: Goal,
+    rule: CandidateRule,
+    reporter: Reporter,
+    roadmap: Roadmap | None = None,
 ) -> list[FloatArray]:
     """Diverse paths from the start to a goal."""
     with told_of_poses_outside(graph, world):
-        routes = find_routes(world, begin, goal.place, rule)
+        routes = find_routes(world, begin, goal.place, rule, roadmap=roadmap)
     reporter.say(_described(routes, begin, goal, rule))
     return routes.paths
 

@@ -88,7 +88,8 @@ def serve(
         server = PageServer(shown, answers, host=host, port=port)
     except OSError as error:
         raise InvalidInputError(
-            f"expected a free port of an address of this machine, got {host}:{port} ({error.strerror}); choose another --port"
+            f"expected a free port of an address of this machine, got {host}:{port} ({error.strerror}); "
+            "choose another --host or --port"
         ) from None
     with server:
         reporter.say(f"Open {server.address} in a browser; Ctrl-C ends the server.")
