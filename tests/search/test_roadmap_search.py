@@ -13,6 +13,7 @@ from roadmap_walks import random_case
 from small_roadmaps import OPEN, drive, simple_walks, small_roadmap, values_of
 from topobelief.candidates.roadmap import Roadmap
 from topobelief.errors import InvalidInputError, NotOptimizedWarning
+from topobelief.search import anytime
 from topobelief.search.evaluations import Evaluations
 from topobelief.search.flows import FlowBound
 from topobelief.search.local_search import LocalSearch, spread_vias
@@ -390,6 +391,31 @@ def test_what_closures_among_the_own_poses_of_a_way_gain_is_told():
     assert result.own_closures_gain > 1e-3
     without = search(graph, roadmap, goal=roadmap.vertices[1], max_detour=1.0)
     assert without.own_closures_gain == 0.0
+
+
+def test_the_bound_does_not_end_the_search_where_walks_may_close_loops_with_themselves(monkeypatch):
+    """The bound counts closures with the map alone, and here meets the value before the best walk is found."""
+    monkeypatch.setattr(anytime, "_WARM_UP", 8)
+    case = random_case(78)
+    rule = {"closures": case.rule, "world": case.world, "spacing": case.spacing, "information": case.information}
+    walks = case.walks()
+    actions = tb.predict_actions(case.graph, [case.roadmap.vertices[walk] for walk in walks], turn=None, **rule)
+    values = tb.Planner(case.graph, objective="joint").entropies(actions)
+    values += case.cost_per_metre * np.array([case.length(walk) for walk in walks])
+    assert case.goal is None
+    result = search(
+        case.graph,
+        case.roadmap,
+        max_length=case.max_length,
+        return_to_start=case.return_to_start,
+        objective="joint",
+        cost_per_metre=case.cost_per_metre,
+        **rule | {"turn": None},
+    )
+    assert result.value == pytest.approx(values.min(), abs=1e-6)
+    assert result.lower_bound == pytest.approx(result.value)
+    assert result.any_sees_itself
+    assert "loops that it would close with itself not counted" in result.summary()
 
 
 def test_no_step_of_the_bound_is_begun_that_would_end_after_the_deadline(monkeypatch):

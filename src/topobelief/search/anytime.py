@@ -118,7 +118,7 @@ class AnytimeSearch:
 
     @property
     def proven(self) -> bool:
-        """Whether no walk can be better, to rounding."""
+        """Whether no walk can be better, to rounding; loops that a walk closes with itself are not counted."""
         return self._best - self.lower_bound <= SAME_VALUE * abs(self._best)
 
     def run(self, seeds: Sequence[Walk]) -> Reason:
@@ -127,10 +127,10 @@ class AnytimeSearch:
             self._local.seed(seeds)
             while True:
                 self._note()
-                if self.proven:
+                if self.proven and not self._evaluations.any_sees_itself:
                     self._bound_front()
                     return "proof"
-                if self._best - self.lower_bound <= self._gap:
+                if self._best - self.lower_bound <= self._gap and self._gap > 0:
                     return "gap"
                 if self.lower_bound >= self._enough:
                     return "enough"
@@ -148,7 +148,7 @@ class AnytimeSearch:
                     self._ahead -= self._clock() - half
                 if not moved:
                     self._bound_front()
-                    return "deadline" if self._no_time else "rest"
+                    return "proof" if self.proven else "deadline" if self._no_time else "rest"
         except KeyboardInterrupt:
             if len(self._evaluations) == 0:
                 raise
@@ -180,7 +180,7 @@ class AnytimeSearch:
         if self._bound is None or self._front is None:
             self._bound, self._front = self._make_bounds()
             self._bound.suggest([np.array(walk) for walk in self._evaluations.best_apart(_SUGGESTED)])
-        if self._bound.finished or self._bound_rests:
+        if self._bound.finished or self.proven or self._bound_rests:
             return False
         if not self._has_time_for("whole"):
             self._no_time = True

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from topobelief.arrays import FloatArray
+from topobelief.arrays import BoolArray, FloatArray
 from topobelief.candidates.distinct_paths import DistinctPaths
 from topobelief.candidates.polyline import path_length
 from topobelief.graph.action import Action
@@ -54,7 +54,8 @@ class Evaluations:
         self._num_paths = 0  # evaluated that are no walks
         self.objectives: dict[Walk, float] = {}  # in the order of their evaluation, cost excluded
         self.lengths: dict[Walk, float] = {}  # metres
-        self.sees_map = False  # whether a loop with the map is closed on any walk so far
+        self.sees_map = False  # whether a loop with the map is closed on any walk so far,
+        self.any_sees_itself = False  # and whether one is closed between a walk's own poses
 
     def __len__(self) -> int:
         """How many exact evaluations were made."""
@@ -77,6 +78,7 @@ class Evaluations:
         actions = self._predict(paths)
         values = self._measure(actions).tolist()
         self.sees_map = self.sees_map or any(self._closes_with_map(action) for action in actions)
+        self.any_sees_itself = self.any_sees_itself or any(self._own_closures(action).any() for action in actions)
         for walk, path, value in zip(new, paths, values, strict=True):
             self.lengths[walk] = path_length(path)
             self.objectives[walk] = value
@@ -90,6 +92,11 @@ class Evaluations:
     def _closes_with_map(self, action: Action) -> bool:
         source, target = action.edges.T
         return bool(((source >= self._planner.graph.num_nodes) & (target < self._planner.graph.num_nodes)).any())
+
+    def _own_closures(self, action: Action) -> BoolArray:
+        """Which edges close a loop between the action's own poses; odometry joins a pose to the one before."""
+        apart = np.abs(action.edges[:, 0] - action.edges[:, 1])
+        return (action.edges.min(axis=1) >= self._planner.graph.num_nodes) & (apart > 1)
 
     def action(self, walk: Walk) -> Action:
         """What driving a walk adds to the graph; its cost is that of its length."""
@@ -105,9 +112,8 @@ class Evaluations:
 
     def value_with_map_alone(self, walk: Walk) -> float:
         """Of a walk if the loops that its own poses close with each other were not closed, cost included."""
-        action, num_poses = self.action(walk), self._planner.graph.num_poses
-        inner, apart = action.edges.min(axis=1) >= num_poses, np.abs(np.diff(action.edges, axis=1)[:, 0])
-        kept = ~(inner & (apart > 1))  # odometry joins a pose to the one before
+        action = self.action(walk)
+        kept = ~self._own_closures(action)
         if kept.all():
             return self.value(walk)
         without = Action(action.poses, action.edges[kept], action.information[kept], length=action.length)

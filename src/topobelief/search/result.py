@@ -69,7 +69,7 @@ class SearchResult(ReadOnlyArrays):
         Value of the best way if loop closures among its own new poses did not count, as the lower bound has it; at least
         `value`.
     proven_optimal : bool
-        Whether the lower bound meets the value, to rounding or to the gap that was asked for as 0.
+        Whether the lower bound meets the value, to rounding.
     value_now : float
         The objective of the graph as it is.
     shortest : Way or None
@@ -78,6 +78,9 @@ class SearchResult(ReadOnlyArrays):
         Metres; the limit.
     sees_map : bool
         Whether any way that was evaluated would close a loop with the map.
+    any_sees_itself : bool
+        Whether any of them would close a loop between its own new poses; the lower bound counts no such loop, so local search
+        goes on although the bound is met.
     num_evaluations : int
         Exact evaluations made.
     seconds : float
@@ -105,6 +108,7 @@ class SearchResult(ReadOnlyArrays):
     shortest: Way | None
     max_length: float
     sees_map: bool
+    any_sees_itself: bool
     num_evaluations: int
     seconds: float
     stopped_by: str
@@ -184,10 +188,15 @@ class SearchResult(ReadOnlyArrays):
 
     def _certificate(self) -> str:
         if self.proven_optimal:
-            return "It is proven that no walk of the roadmap within the length is better."
+            return f"It is proven that no walk of the roadmap within the length is better{self._but_for_own_closures}."
         if math.isinf(self.lower_bound):
             return "Nothing is proven of other walks."
-        return f"No walk of the roadmap within the length is better by more than {said(self.gap, self.objective)}."
+        gap = said(self.gap, self.objective)
+        return f"No walk of the roadmap within the length is better by more than {gap}{self._but_for_own_closures}."
+
+    @property
+    def _but_for_own_closures(self) -> str:
+        return ", loops that it would close with itself not counted" if self.any_sees_itself else ""
 
     def __str__(self) -> str:
         return self.summary()

@@ -279,6 +279,7 @@ def search_roadmap(
             shortest=None if goal is None else way(walks.walk(())),
             max_length=walks.max_length,
             sees_map=evaluations.sees_map,
+            any_sees_itself=evaluations.any_sees_itself,
             num_evaluations=len(evaluations),
             seconds=clock() - began,
             stopped_by="proof" if stays else stopped_by,
