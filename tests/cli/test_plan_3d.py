@@ -5,8 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from drives_3d import ramp
-from topobelief.geometry import SE3_GROUP
+from drives_3d import measured, ramp
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.g2o import write_g2o
 from topobelief.io.path_formats import write_path
@@ -18,12 +17,8 @@ SOON = ("--vertices", "60", "--robot-radius", "0.3", "--candidates", "2", "--no-
 def garage(tmp_path):
     """A drive up a ramp, measured with noise."""
     graph = ramp()
-    rng = np.random.default_rng(0)
-    a, b = graph.edges.T
-    noise = 0.01 * rng.normal(size=(graph.num_edges, 6))
-    measured = SE3_GROUP.compose(SE3_GROUP.between(graph.poses[a], graph.poses[b]), SE3_GROUP.exp(noise))
     file = tmp_path / "garage.g2o"
-    write_g2o(PoseGraph(graph.poses, graph.edges, measured, graph.information), file)
+    write_g2o(measured(graph.poses, graph.edges.tolist(), metres=0.01, radians=0.01), file)
     return file
 
 

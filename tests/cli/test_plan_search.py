@@ -193,4 +193,4 @@ def test_an_interrupted_search_gives_the_best_so_far(topobelief, office, monkeyp
     outcome = topobelief(to_goal(office))
     assert outcome.code == 0
     assert "ended: interrupted" in outcome.out
-    assert "Nothing is proven of other walks in this time" in outcome.out
+    assert "Nothing is proven of other walks in this time: give more --seconds, or compare a list of paths" in outcome.out

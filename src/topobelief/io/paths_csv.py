@@ -38,7 +38,7 @@ def read_csv_path(path: StrPath) -> FiledPath:
             if header in _HEADERS:
                 names = header
                 continue
-            names = next((each for each in _HEADERS if len(each) == len(fields)), [])
+            names = next((each for each in _HEADERS if len(each) == len(fields)), list[str]())
             if not names or fields[0][:1].isalpha():
                 raise FileError(path, f"expected the columns {_EXPECTED}, got {line[:60]!r}", line=number)
         rows.append(finite_numbers(path, number, fields, " ".join(names)))
