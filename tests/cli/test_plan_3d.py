@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from drives_3d import measured, ramp
+from drives_3d import hills, measured, ramp, torus
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.g2o import write_g2o
 from topobelief.io.path_formats import write_path
@@ -50,6 +50,27 @@ def test_a_flight_takes_the_short_way_up(topobelief, garage, tmp_path):
     document = json.loads((tmp_path / "fly" / "decision.json").read_text())
     assert document["actions"][0]["length"] < 20
     assert document["options"]["attitude"] == "along"
+
+
+@pytest.mark.parametrize(
+    ("graph", "goal", "told"),
+    [
+        (torus(windings=8, poses_per_winding=24), 20, "a robot that flies"),
+        (hills(junctions=12, step=10), 30, "a robot that drives"),
+    ],
+    ids=["torus", "hills"],
+)
+def test_whether_it_drives_or_flies_is_told_by_its_poses(topobelief, tmp_path, graph, goal, told):
+    """On the hull of a torus, and over the hills of a town, where the way keeps to the ground."""
+    write_g2o(graph, tmp_path / "graph.g2o")
+    outcome = topobelief(["plan", "graph.g2o", "--goal", str(goal), *SOON])
+    assert outcome.code == 0, outcome.err
+    assert told in outcome.out
+    document = json.loads((tmp_path / "out" / "decision.json").read_text())
+    path = np.array(document["actions"][0]["waypoints"])
+    away = np.linalg.norm(path[:, None] - graph.positions, axis=2).min(axis=1)
+    assert away.max() < 25
+    assert document["expected_errors"]["chosen"]["map_rmse"] <= document["expected_errors"]["now"]["map_rmse"] + 1e-9
 
 
 @pytest.mark.parametrize("name", ["own.csv", "own.tum", "own.yaml"])
