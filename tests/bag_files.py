@@ -94,7 +94,7 @@ def write_bag(
 ) -> Path:
     """A bag with these messages, one a second, topic after topic; a folder for ROS 2.
 
-    Compression is "lz4" or "bz2" for ROS 1, "file" or "message" for ROS 2.
+    Compression is "lz4" or "bz2" for ROS 1, "file" or "message" for ROS 2, and there "storage" for MCAP.
     """
     if format_name == "ROS 1":
         path, writer = folder / "drive.bag", Writer1(folder / "drive.bag")

@@ -1,5 +1,7 @@
 """Roadmaps, diverse paths and predicted factors in space."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -58,6 +60,14 @@ def test_a_door_is_found_and_a_wall_is_told():
         tb.build_roadmap(room(), (0.1, 1, 1), goal, 30, 0.2)
     with pytest.raises(InvalidInputError, match=r"finite goal \(x, y, z\)"):
         tb.build_roadmap(room(), start, (9, 4), 30, 0.2)
+
+
+@pytest.mark.parametrize("world", [tb.World3D.from_cells(np.ones((20, 10, 10), dtype=bool), 0.5), room()], ids=["hall", "door"])
+def test_the_shortest_way_is_straightened(world):
+    """Through random places alone it would be a sixth too long."""
+    start, goal = (1, 1, 1), (9, 4, 4)
+    roadmap = tb.build_roadmap(world, start, goal, 60, 0.2)
+    assert path_length(roadmap.vertices[roadmap.shortest_path()]) == pytest.approx(math.dist(start, goal))
 
 
 def test_trips_have_a_far_place_as_second_vertex():

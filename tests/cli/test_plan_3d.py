@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from drives_3d import ramp
-from topobelief.geometry import SE3_GROUP
+from drives_3d import hills, measured, ramp, torus
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.g2o import write_g2o
+from topobelief.io.path_formats import write_path
 
 SOON = ("--vertices", "60", "--robot-radius", "0.3", "--candidates", "2", "--no-exact")
 
@@ -17,12 +17,8 @@ SOON = ("--vertices", "60", "--robot-radius", "0.3", "--candidates", "2", "--no-
 def garage(tmp_path):
     """A drive up a ramp, measured with noise."""
     graph = ramp()
-    rng = np.random.default_rng(0)
-    a, b = graph.edges.T
-    noise = 0.01 * rng.normal(size=(graph.num_edges, 6))
-    measured = SE3_GROUP.compose(SE3_GROUP.between(graph.poses[a], graph.poses[b]), SE3_GROUP.exp(noise))
     file = tmp_path / "garage.g2o"
-    write_g2o(PoseGraph(graph.poses, graph.edges, measured, graph.information), file)
+    write_g2o(measured(graph.poses, graph.edges.tolist(), metres=0.01, radians=0.01), file)
     return file
 
 
@@ -54,6 +50,41 @@ def test_a_flight_takes_the_short_way_up(topobelief, garage, tmp_path):
     document = json.loads((tmp_path / "fly" / "decision.json").read_text())
     assert document["actions"][0]["length"] < 20
     assert document["options"]["attitude"] == "along"
+
+
+@pytest.mark.parametrize(
+    ("graph", "goal", "told"),
+    [
+        (torus(windings=8, poses_per_winding=24), 20, "a robot that flies"),
+        (hills(junctions=12, step=10), 30, "a robot that drives"),
+    ],
+    ids=["torus", "hills"],
+)
+def test_whether_it_drives_or_flies_is_told_by_its_poses(topobelief, tmp_path, graph, goal, told):
+    """On the hull of a torus, and over the hills of a town, where the way keeps to the ground."""
+    write_g2o(graph, tmp_path / "graph.g2o")
+    outcome = topobelief(["plan", "graph.g2o", "--goal", str(goal), *SOON])
+    assert outcome.code == 0, outcome.err
+    assert told in outcome.out
+    document = json.loads((tmp_path / "out" / "decision.json").read_text())
+    path = np.array(document["actions"][0]["waypoints"])
+    away = np.linalg.norm(path[:, None] - graph.positions, axis=2).min(axis=1)
+    assert away.max() < 25
+    assert document["expected_errors"]["chosen"]["map_rmse"] <= document["expected_errors"]["now"]["map_rmse"] + 1e-9
+
+
+@pytest.mark.parametrize("name", ["own.csv", "own.tum", "own.yaml"])
+def test_a_path_of_ones_own_is_a_candidate(topobelief, garage, tmp_path, name):
+    """Down the ramp along the poses of the graph, judged and predicted at their heights; beside others, with their goal."""
+    poses = np.array(ramp().poses[:1:-1])
+    write_path(tmp_path / name, poses)
+    outcome = topobelief(["plan", str(garage), "--goal", "2", *SOON, "--path", name, "--width", "3", "--no-optimize"])
+    assert outcome.code == 0, outcome.err
+    actions = json.loads((tmp_path / "out" / "decision.json").read_text())["actions"]
+    assert len(actions) == 3
+    (own,) = [action for action in actions if action["label"].endswith(name)]
+    assert own["goal"] == 0
+    np.testing.assert_allclose(own["waypoints"], poses[:, :3], atol=1e-9)
 
 
 def test_a_search_in_a_voxel_world(topobelief, garage, tmp_path):
@@ -93,7 +124,8 @@ def test_info_says_whether_a_place_on_a_floor_is_free(topobelief, garage):
     [
         (["--goal", "1", "2"], "expected --goal as X Y Z for a graph in SE(3), got 2 numbers"),
         (["--goal", "0", "0", "0"], "choose the nearest free place"),
-        (["--goal", "2", "--path", "own.csv"], "expected no --path in 3D"),
+        (["--goal", "2", "--path", "flat.csv"], "flat.csv:1: expected a path with heights, got x and y alone"),
+        (["--path", "through.csv"], "through.csv:3: expected a path that keeps more than the robot's radius of 0.35 m"),
         (["--goal", "2", "--driving", "--height", "5", "--width", "3"], "expected --height below --width"),
         (["--goal", "2", "--flying", "--map", "cloud.pcd"], "expected no --map with --flying or --driving"),
         (["--goal", "2", "--map", "cloud.pcd"], "nothing of that name"),
@@ -102,6 +134,8 @@ def test_info_says_whether_a_place_on_a_floor_is_free(topobelief, garage):
 )
 def test_what_makes_no_sense_in_space(topobelief, garage, tmp_path, options, message):
     np.save(tmp_path / "grid.npy", np.zeros((2, 2, 2)))
+    (tmp_path / "flat.csv").write_text("1,2\n")
+    (tmp_path / "through.csv").write_text("x,y,z\n10,0,6\n10,0,3\n")
     outcome = topobelief(["plan", str(garage), *options, "--vertices", "50", "--out", "result"])
     assert outcome.code == 2
     assert outcome.err.count("\n") == 1

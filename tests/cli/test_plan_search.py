@@ -11,6 +11,7 @@ import topobelief as tb
 from topobelief.candidates.polyline import path_length
 from topobelief.cli import plan_mode
 from topobelief.io.path_formats import read_path
+from topobelief.search import roadmap_search
 
 FEW = ("--vertices", 60, "--max-evaluations", 100)
 
@@ -45,6 +46,13 @@ def test_the_answer_comes_with_the_certificate_and_the_front(topobelief, office,
     assert {file.name for file in (tmp_path / "out").iterdir()} == {"paths.png", "decision.json"}
     plan = json.loads((tmp_path / "out" / "decision.json").read_text())
     assert np.allclose(read_path(tmp_path / "best.csv")[:, :2], plan["search"]["path"])
+
+
+def test_the_graph_is_factored_once_for_all_goals_and_the_decision(topobelief, office, monkeypatch):
+    """Before the time of the search begins; a search that made a planner of its own would fail here."""
+    monkeypatch.setattr(roadmap_search, "Planner", None)
+    plan = document(topobelief, to_goal(office, "--goal", 5, 10))
+    assert {action["goal"] for action in plan["actions"]} == {0, 1}
 
 
 def test_the_document_is_what_the_library_finds(topobelief, office):
@@ -193,4 +201,4 @@ def test_an_interrupted_search_gives_the_best_so_far(topobelief, office, monkeyp
     outcome = topobelief(to_goal(office))
     assert outcome.code == 0
     assert "ended: interrupted" in outcome.out
-    assert "Nothing is proven of other walks in this time" in outcome.out
+    assert "Nothing is proven of other walks in this time: give more --seconds, or compare a list of paths" in outcome.out

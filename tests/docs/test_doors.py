@@ -15,6 +15,7 @@ from topobelief.cli.app import run
 from topobelief.geometry import SE2_GROUP
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.g2o import write_g2o
+from topobelief.io.toro import write_toro
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "doors.md"
 RECIPES = re.findall(r"^## ([^\n]+)\n|^```sh\n(.*?)^```$", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
@@ -50,6 +51,7 @@ def write_files(recipe: str) -> None:
     steps = [(index, index + 1) for index in range(len(poses) - 1)]
     graph = PoseGraph(poses, steps + closures(poses), None, np.diag([400.0, 400, 3000]))
     write_g2o(graph, "graph.g2o")
+    write_toro(graph, "graph.toro")
     database = Database()
     database.nodes = [(index + 1, 0, _matrix(pose)) for index, pose in enumerate(poses)]
     measured = zip(graph.edges.tolist(), graph.measurements, strict=True)

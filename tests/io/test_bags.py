@@ -8,10 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rosbags.highlevel import AnyReader
 
 from bag_files import FORMATS, Messages, messages_for, write_bag
 from door_files import LIST, SPHERE, STRIP
 from topobelief.errors import FileError, InvalidInputError
+from topobelief.io import decompression
 from topobelief.io.bag_maps import read_bag_grid
 from topobelief.io.floor_plan import read_world
 from topobelief.io.formats import read_graph_file
@@ -128,6 +130,21 @@ def test_compressed_bags_are_read(compression: str, tmp_path: Path):
     bag = write_bag(tmp_path, name, made, topics, compression=compression)
     assert read_graph_file(bag, options()).graph.num_poses == 4
     assert read_bag_grid(bag).cells.tolist() == [[0, 0], [0, 0]]
+
+
+@pytest.mark.parametrize("compression", ["lz4", "bz2", "file", "message", "storage"])
+def test_a_bag_that_decompresses_to_far_more_than_its_size_is_refused(compression: str, tmp_path: Path, monkeypatch):
+    """5 MB of zeros in a few kilobytes; what other programs read by rosbags is as before."""
+    name = {"lz4": "ROS 1", "bz2": "ROS 1", "storage": "ROS 2 MCAP"}.get(compression, "ROS 2 SQLite")
+    made = messages_for(name)
+    topics = {"/odom": [made.odometry(*place) for place in PLACES], "/map": [made.grid(np.zeros((2200, 2200)))]}
+    bag = write_bag(tmp_path, name, made, topics, compression=compression)
+    assert read_bag_grid(bag).cells.size == 4_840_000
+    monkeypatch.setattr(decompression, "_ALWAYS", 1_000_000)
+    with pytest.raises(FileError, match=r"expected a bag that decompresses to at most \d+ MB \(100 times its size, or 1 MB\)"):
+        read_bag_grid(bag)
+    with AnyReader([bag]) as reader:
+        assert sum(len(data) for _, _, data in reader.messages()) > 4_840_000
 
 
 def test_a_topic_without_messages_is_passed_over(tmp_path: Path):

@@ -6,6 +6,7 @@ Mutations are drawn from a seed: bytes are overwritten, cut out, doubled or move
 
 from __future__ import annotations
 
+import io
 import random
 import resource
 import sys
@@ -20,14 +21,16 @@ import numpy as np
 import pytest
 
 from bag_files import FORMATS, messages_for, write_bag
+from cloud_files import CLOUDS
 from door_files import LIST, SPHERE, Database, cartographer, slam_toolbox
-from graph_texts import PLANAR, SPATIAL, TORO
+from graph_texts import LANDMARKS, LANDMARKS_IN_SPACE, PLANAR, SPATIAL, TORO
 from topobelief.errors import MapWarning, ReadingWarning, TopobeliefError
 from topobelief.io.floor_plan import read_world
 from topobelief.io.formats import read_graph_file
+from topobelief.io.map_3d import read_world_3d
 from topobelief.io.nav_path import json_of_path, yaml_of_path
 from topobelief.io.path_formats import read_path
-from topobelief.io.reading import Droppable, ReadingOptions
+from topobelief.io.reading import Droppable, Edge2Order, ReadingOptions
 from topobelief.io.ros_map import write_ros_map
 
 ROUNDS = 200
@@ -53,7 +56,20 @@ ODD = [
     "{",
     "\t",
     "x:",
+    "x0",
     "\x85",
+    "\u2028",
+    "\ufffd",
+    "١",
+    "9223372036854775808",
+    "1e308",
+    "5e-324",
+    "0.5",
+    "VERTEX_SE2",
+    "EDGE_SE3:QUAT",
+    "EDGE2",
+    "FIX",
+    "PARAMS_",
 ]
 
 
@@ -92,6 +108,13 @@ def ros_map(suffix: str) -> bytes:
         return Path(folder, f"map{suffix}").read_bytes()
 
 
+def grid() -> bytes:
+    """A grid in space as NumPy saves it."""
+    content = io.BytesIO()
+    np.save(content, np.array([[[0, 1], [1, 0]], [[-1, 100], [0, 0]]]))
+    return content.getvalue()
+
+
 def nav_path() -> str:
     return yaml_of_path(np.array([[0.0, 0, 0], [1, 0, 0.5], [2, 1, 1]]))
 
@@ -118,8 +141,12 @@ def _with_image(path: Path, rng: random.Random) -> None:
     _world(path, rng)
 
 
+def _map_3d(path: Path, rng: random.Random) -> None:
+    read_world_3d(path, resolution=rng.choice([0.5, 2.0]), unknown=rng.choice(["free", "occupied"]))
+
+
 def _path(path: Path, rng: random.Random) -> None:
-    read_path(path)
+    read_path(path, in_space=rng.random() < 0.5)
 
 
 MAP, IMAGE = ros_map(".yaml"), ros_map(".pgm")
@@ -127,6 +154,8 @@ Reader = Callable[[Path, random.Random], None]
 SEEDS: dict[str, tuple[str, bytes, Reader]] = {  # name of the file, its content, what reads it
     "g2o": ("file", PLANAR.encode(), _graph),
     "g2o in space": ("file", SPATIAL.encode(), _graph),
+    "landmarks": ("file", LANDMARKS.encode(), _graph),
+    "landmarks in space": ("file", LANDMARKS_IN_SPACE.encode(), _graph),
     "TORO": ("file", TORO.encode(), _graph),
     "iSAM": (
         "file",
@@ -144,7 +173,10 @@ SEEDS: dict[str, tuple[str, bytes, Reader]] = {  # name of the file, its content
     "ROS map": ("map.yaml", MAP, _with_image),
     "image of a ROS map": ("map.pgm", IMAGE, _image),
     "walls": ("walls.csv", b"# bounds: 0 0 9 9\nx_min,y_min,x_max,y_max\n1,1,2,2\n3,3,5,4\n", _world),
+    "grid in space": ("grid.npy", grid(), _map_3d),
+    **{f"point cloud, {name}": (name, content, _map_3d) for name, content in CLOUDS.items()},
     "path in CSV": ("path.csv", b"x,y,yaw\n0,0,0\n1,0,0.5\n2,1,1\n", _path),
+    "path in space, CSV": ("path.csv", b"x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,1\n1,0,2,0,0.6,0,0.8\n", _path),
     "path in TUM": ("path.tum", TUM.encode(), _path),
     "nav_msgs/Path in YAML": ("path.yaml", nav_path().encode(), _path),
     "nav_msgs/Path in JSON": ("path.json", json_of_path(np.array([[0.0, 0, 0], [1, 0, 0.5]])).encode(), _path),
@@ -183,8 +215,9 @@ def mutated(content: bytes, rng: random.Random) -> bytes:
 def options(rng: random.Random) -> ReadingOptions:
     return ReadingOptions(
         drop=rng.sample(KINDS, rng.choice([0, 4, len(KINDS)])),
-        edge2_order=rng.choice(["toro", "isam", "isam_root"]),
-        component=rng.choice(["all", "largest", 1]),
+        robust_as_plain=rng.random() < 0.2,
+        edge2_order=rng.choice(get_args(Edge2Order)),
+        component=rng.choice(["all", "largest", 1, "x1"]),
         planar=rng.random() < 0.3,
         noise=rng.choice([None, (0.1, 0.1), (0.1, 0.1)]),
         spacing=rng.choice([0.1, 2.0]),

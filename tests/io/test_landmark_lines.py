@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -129,3 +130,27 @@ def test_bearings_and_ranges_are_written_as_the_positions_that_they_are_to_first
     assert tb.joint_entropy(linear) == pytest.approx(tb.joint_entropy(graph), abs=1e-9)
     tb.write_g2o(linear, tmp_path / "again.g2o")
     assert tb.read_g2o(tmp_path / "again.g2o").chi2 == pytest.approx(graph.chi2)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "EDGE_SE2_XY 1 7 1 2 4 1e308 9",
+        "EDGE_SE2_XY 1 7 1e200 2 4 1 9",
+        "EDGE_SE2_XY 1 7 1 2 1.7e308 1 1.7e308",
+        "BR 0 7 0.5 2 1e-200 0.2",
+        "LANDMARK 0 7 1 0 1e-320 0 1",
+        "LANDMARK 0 7 1 0 0.4 1e308 0.4",
+    ],
+)
+@pytest.mark.filterwarnings("error")
+def test_numbers_beyond_all_bounds_are_read_or_refused_without_a_word_from_numpy(filed, line):
+    with suppress(FileError):
+        tb.read_g2o(filed(f"{PLANE}{line}\n"))
+
+
+@pytest.mark.filterwarnings("error")
+def test_covariances_that_have_no_inverse_are_refused(filed):
+    text = "VERTEX2 0 0 0 0\nVERTEX2 1 1 0 0\nEDGE2 0 1 1 0 0 1 0 1e308 1 0 0\n"
+    with pytest.raises(FileError, match="positive definite"):
+        tb.read_pose_graph(filed(text), edge2_order="covariance")

@@ -72,10 +72,32 @@ def test_what_is_written_is_read_again(tmp_path, name):
 
 def test_a_message_is_read_as_ros_prints_it(tmp_path):
     filed = read_filed_path(written(tmp_path, "path.yaml", ECHOED))
-    assert filed.poses == pytest.approx(np.array([(1, 2, math.pi / 2), (1, 3.5, 0)]))
+    assert filed.in_plane == pytest.approx(np.array([(1, 2, math.pi / 2), (1, 3.5, 0)]))
     assert filed.lines == (7, 22)
     as_json = json.dumps(yaml.safe_load(ECHOED.removesuffix("---\n")), indent="\t")
-    assert read_path(written(tmp_path, "path.json", as_json)).tolist() == filed.poses.tolist()
+    assert read_path(written(tmp_path, "path.json", as_json)).tolist() == filed.in_plane.tolist()
+
+
+@pytest.mark.parametrize("name", ["p.csv", "p.tum", "p.yaml", "p.json"])
+def test_what_is_written_in_space_is_read_again(tmp_path, name):
+    poses = np.array([(1, 2, -3, 0, 0, 0, 1), (2, 2, 0.5, 0.6, 0, 0, 0.8)])
+    write_path(tmp_path / name, poses)
+    np.testing.assert_allclose(read_path(tmp_path / name, in_space=True), poses, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(read_path(tmp_path / name)[:, :2], poses[:, :2])
+
+
+def test_a_csv_of_places_in_space_is_upright_and_heads_as_it_goes(tmp_path):
+    """Straight up the heading stays."""
+    file = written(tmp_path, "path.csv", "x,y,z\n0,0,1\n0,2,1\n0,2,4\n")
+    half = math.sqrt(0.5)
+    expected = [(0, 0, 1, 0, 0, half, half), (0, 2, 1, 0, 0, half, half), (0, 2, 4, 0, 0, half, half)]
+    np.testing.assert_allclose(read_path(file, in_space=True), expected, atol=1e-12)
+    assert read_path(file) == pytest.approx(np.array([(0, 0, math.pi / 2), (0, 2, math.pi / 2), (0, 2, math.pi / 2)]))
+
+
+def test_a_path_without_heights_is_none_in_space(tmp_path):
+    with pytest.raises(FileError, match=r"p.csv:2: expected a path with heights, got x and y alone; add the column z"):
+        read_path(written(tmp_path, "p.csv", "x,y\n1,2\n"), in_space=True)
 
 
 def test_a_message_is_written_with_the_fields_of_ros(tmp_path):
@@ -107,8 +129,12 @@ def test_heights_times_and_tilts_do_not_matter(tmp_path):
         ("p.csv", "x,y\n1,2\n3,a\n", "p.csv:3: expected finite numbers x y, got '3 a'"),
         ("p.csv", "x,y,yaw\n1,2\n", "p.csv:2: expected finite numbers x y yaw, got '1 2'"),
         ("p.csv", "1,2\nnan,3\n", "p.csv:2: expected finite numbers x y, got 'nan 3'"),
-        ("p.csv", "lat,lon\n1,2\n", "p.csv:1: expected the columns x,y or x,y,yaw, got 'lat,lon'"),
-        ("p.csv", "1 2\n", "p.csv:1: expected the columns x,y or x,y,yaw, got '1 2'"),
+        (
+            "p.csv",
+            "lat,lon\n1,2\n",
+            "p.csv:1: expected the columns x,y or x,y,yaw, in space x,y,z or x,y,z,qx,qy,qz,qw, got 'lat,lon'",
+        ),
+        ("p.csv", "1 2\n", "p.csv:1: expected the columns x,y or x,y,yaw, in space x,y,z or x,y,z,qx,qy,qz,qw, got '1 2'"),
         ("p.csv", "x,y\n", "p.csv: expected at least one pose"),
         ("p.tum", "1 2 3\n", "p.tum:1: expected finite numbers timestamp x y z qx qy qz qw, got '1 2 3'"),
         ("p.tum", "# nothing\n", "p.tum: expected at least one pose"),

@@ -288,6 +288,12 @@ class TestErrors:
             with pytest.raises(FileError, match=r"map\.pgm: expected an image of at most 150 million pixels, .*; crop the map"):
                 read_ros_map(path)
 
+    def test_an_image_of_many_pixels_in_few_bytes_is_refused_before_it_is_decoded(self, tmp_path: Path) -> None:
+        path = write_map(tmp_path, image="map.png")
+        Image.new("1", (6000, 6000)).save(tmp_path / "map.png")
+        with pytest.raises(FileError, match=r"at most 30 million pixels, or 100 for each byte, got 6000 x 6000 in \d+ bytes"):
+            read_ros_map(path)
+
     def test_no_warning_of_the_image_library_leaks(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         """Pillow warns of images that it finds large: of 90 million pixels, or of what is set here."""
         monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 5)

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import topobelief as tb
+from topobelief.candidates.roadmap_graph import with_way
 from topobelief.search import refinement
-from topobelief.search.refinement import Refinement, with_way
+from topobelief.search.refinement import Refinement
 
 CLOSURES = tb.ClosureModel(max_per_pose=1, probability=1.0)
 HALL = tb.World.from_boxes([(4, 3, 6, 5)], bounds=(0, 0, 10, 8))

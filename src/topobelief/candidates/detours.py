@@ -21,7 +21,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from topobelief.arrays import BoolArray, FloatArray, IntArray
 from topobelief.candidates.polyline import path_length, stations
-from topobelief.candidates.roadmap import Roadmap
+from topobelief.candidates.roadmap_graph import Roadmap
 from topobelief.geometry.segments import distances_to_segments
 from topobelief.world.segment_index import SegmentIndex
 

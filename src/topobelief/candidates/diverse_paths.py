@@ -18,7 +18,7 @@ from topobelief.candidates.detours import Balls, DetourSearch
 from topobelief.candidates.distinct_paths import DistinctPaths
 from topobelief.candidates.homotopy import Rays, shortest_paths_by_class
 from topobelief.candidates.polyline import path_length
-from topobelief.candidates.roadmap import Roadmap
+from topobelief.candidates.roadmap_graph import Roadmap
 from topobelief.candidates.straightening import Straightening
 from topobelief.errors import InvalidInputError, PlanningError
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from topobelief.arrays import BoolArray, FloatArray
 from topobelief.candidates.polyline import path_length
-from topobelief.candidates.roadmap import Roadmap
+from topobelief.candidates.roadmap_graph import Roadmap
 from topobelief.world import World, shapes
 
 Point = tuple[float, float]

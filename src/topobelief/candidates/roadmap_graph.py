@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, cast
 
@@ -16,6 +16,7 @@ from shapely import Polygon
 
 from topobelief.arrays import BoolArray, FloatArray, IntArray
 from topobelief.candidates.ends import SAME_PLACE, checked_ends, shown_place
+from topobelief.candidates.polyline import checked_path
 from topobelief.errors import PlanningError
 from topobelief.wording import counted
 from topobelief.world import FreeSpace
@@ -154,3 +155,20 @@ def free_edges(world: FreeSpace, vertices: FloatArray, robot_radius: float, *, o
 def each_once(edges: IntArray) -> IntArray:
     """The edges sorted, shape (E, 2), smaller index first."""
     return np.unique(np.sort(edges, axis=1), axis=0)
+
+
+def with_way(roadmap: Roadmap, path: FloatArray) -> tuple[Roadmap, tuple[int, ...]]:
+    """A roadmap with the waypoints of a free path as vertices, after its own; and the path as vertices of it.
+
+    Waypoints are joined along the path and to their neighbours.
+    """
+    path = checked_path(path)
+    apart = np.linalg.norm(roadmap.vertices[None] - path[:, None], axis=2)
+    nearest, known = apart.argmin(axis=1), apart.min(axis=1) <= SAME_PLACE
+    count = len(roadmap.vertices)
+    walk = np.where(known, nearest, count + np.cumsum(~known) - 1)
+    vertices = np.concatenate([roadmap.vertices, path[~known]])
+    along = np.stack([walk[:-1], walk[1:]], axis=1)
+    joined = free_edges(roadmap.world, vertices, roadmap.robot_radius, of=np.arange(count, len(vertices)))
+    edges = each_once(np.concatenate([roadmap.edges, along, joined]))
+    return replace(roadmap, vertices=vertices, edges=edges), tuple(walk.tolist())

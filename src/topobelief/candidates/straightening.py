@@ -12,7 +12,7 @@ from topobelief.arrays import FloatArray, IntArray
 from topobelief.candidates.detours import Balls
 from topobelief.candidates.homotopy import Rays, Word, joined
 from topobelief.candidates.polyline import subdivided
-from topobelief.candidates.roadmap import Roadmap
+from topobelief.candidates.roadmap_graph import Roadmap
 
 _VERTICES_AHEAD = 32  # to which a cut corner leads at most
 _PIECES = 4  # of each leg of a path, between which corners are cut

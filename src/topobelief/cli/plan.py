@@ -170,6 +170,7 @@ def plan(
             determinant=determinant,
             normalized=normalized,
             allow_dense_spectrum=allow_dense_spectrum,
+            engine="incremental" if mode.searches else "auto",
         )
     if mode.note:
         reporter.note(mode.note)
@@ -183,7 +184,7 @@ def plan(
         enough=enough,
     )
     if mode.searches:
-        searched = plan_search.search(graph, world, begin, goals, rule, objective, limits, reporter)
+        searched = plan_search.search(planner, world, begin, goals, rule, limits, reporter)
         found = searched.proposals
     else:
         found = plan_candidates.find_proposals(

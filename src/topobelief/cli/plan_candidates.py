@@ -132,10 +132,8 @@ def _described(routes: Routes, begin: Start, goal: Goal, rule: CandidateRule) ->
 
 def _from_file(world: FreeSpace, begin: Start, file: Path, goals: Sequence[Goal], robot_radius: float) -> _Way:
     """A path from a file, led to from the start; each of its legs must keep the robot from what is not free."""
-    if world.dim != 2:
-        raise FileError(file, "expected no --path in 3D, got one: candidates of your own are read in the plane; leave it out")
     filed = read_filed_path(file)
-    places = filed.poses[:, :2]
+    places = (filed.in_plane if world.dim == 2 else filed.in_space(file))[:, : world.dim]
     leads_in = bool((places[0] != begin.place).any())
     ends = np.vstack([begin.place, places]) if leads_in else places
     lines = [filed.lines[0], *filed.lines] if leads_in else filed.lines

@@ -64,7 +64,8 @@ def certificate(searched: Searched, limits: Limits) -> str:
     """Below which value no walk is, and which walks that is about."""
     found, bound = searched.found, searched.lower_bound
     if math.isinf(bound):
-        return "Nothing is proven of other walks in this time: give more --seconds."
+        listed = ", or compare a list of paths, with a proof, by --candidates 20" if searched.has_goal else ""
+        return f"Nothing is proven of other walks in this time: give more --seconds{listed}."
     to = " to the goal" if searched.num_searches == 1 else " to a goal"
     where = to if searched.has_goal else " back to the start" if limits.return_to_start else ""
     longest = "" if searched.num_searches > 1 else f", up to {found.max_length:.1f} m,"

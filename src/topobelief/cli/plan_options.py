@@ -141,8 +141,8 @@ PathFiles = Annotated[
     typer.Option(
         "--path",
         metavar="FILE",
-        help="A candidate of your own: .csv (x,y or x,y,yaw), .tum, or nav_msgs/Path in .yaml or .json. May be repeated, "
-        "with or without a goal.",
+        help="A candidate of your own: .csv (x,y or x,y,yaw; x,y,z in 3D), .tum, or nav_msgs/Path in .yaml or .json. May be "
+        "repeated, with or without a goal.",
         show_default=False,
         rich_help_panel=_CANDIDATES,
     ),

@@ -121,7 +121,7 @@ def _checked_with_points(array: FloatArray, points: BoolArray, shape: tuple[int,
         )
     checked = np.array(_symmetric(whole))
     checked[points] = 0.0
-    checked[points, :k, :k] = (blocks + blocks.transpose(0, 2, 1))[points] / 2
+    checked[points, :k, :k] = (blocks / 2 + blocks.transpose(0, 2, 1) / 2)[points]
     return read_only(checked)
 
 
@@ -148,17 +148,21 @@ def measures_rotations(information: FloatArray) -> BoolArray:
 
 
 def positive_definite(information: FloatArray) -> BoolArray:
-    """Which of some finite symmetric matrices are positive definite to rounding, whatever the units; shape (num_edges,)."""
-    definite: BoolArray = np.asarray((np.diagonal(information, axis1=1, axis2=2) > 0).all(axis=1))
+    """Which of some symmetric matrices are finite and positive definite to rounding, whatever the units; shape (num_edges,)."""
+    definite: BoolArray = np.asarray(np.isfinite(information).all(axis=(1, 2)))
+    definite &= (np.diagonal(information, axis1=1, axis2=2) > 0).all(axis=1)
     smallest = np.linalg.eigvalsh(_scaled(information[definite]))[:, 0]
     definite[definite] = smallest > np.finfo(float).eps * information.shape[1]
     return definite
 
 
 def _scaled(information: FloatArray) -> FloatArray:
-    """Matrices of positive diagonals brought to diagonals of ones."""
+    """Matrices of positive diagonals brought to diagonals of ones; others of their entries beyond 2, which none has that is
+    positive definite, to 2.
+    """
     scale = 1 / np.sqrt(np.diagonal(information, axis1=1, axis2=2))
-    return information * scale[:, :, None] * scale[:, None, :]
+    with np.errstate(over="ignore"):
+        return np.clip(information * scale[:, :, None] * scale[:, None, :], -2.0, 2.0)
 
 
 def _symmetric(matrices: FloatArray) -> FloatArray:
@@ -166,7 +170,7 @@ def _symmetric(matrices: FloatArray) -> FloatArray:
     transposed = np.swapaxes(matrices, -1, -2)
     if np.array_equal(matrices, transposed):
         return matrices
-    return read_only((matrices + transposed) / 2)
+    return read_only(matrices / 2 + transposed / 2)
 
 
 def _require_positive_definite(information: FloatArray) -> None:

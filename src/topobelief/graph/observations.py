@@ -90,6 +90,7 @@ def numbers_read(codes: ReadingCodes, group: Group) -> int:
     return total + sum(kind.dimension(group.position_dim) * len(edges) for kind, edges in observations_by_kind(codes))
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of landmarks beyond all bounds, which are refused
 def information_at(
     group: Group, poses: FloatArray, edges: IntArray, noise: FloatArray, codes: ReadingCodes, ids: IntArray
 ) -> FloatArray:

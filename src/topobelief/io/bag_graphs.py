@@ -46,10 +46,7 @@ def read_bag(path: StrPath, options: ReadingOptions) -> ReadGraph:
             for marker in markers_of_message(path, recording.messages[-1], where=repr(recording.topic))
         ]
         return graph_of_markers(path, markers, options, notes)
-    if first.kind == PATH:
-        poses = [stamped.pose for stamped in first.messages[-1].poses]
-    else:
-        poses = [message.pose.pose for message in first.messages]
+    poses = [stamped.pose for stamped in first.messages[-1].poses] if first.kind == PATH else first.messages
     return graph_along(path, poses_of_messages(path, poses, where=repr(first.topic)), options, notes)
 
 

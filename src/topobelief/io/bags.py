@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from topobelief.errors import FileError
+from topobelief.io import decompression
 from topobelief.io.files import StrPath, read_head
 from topobelief.optional import load
 from topobelief.wording import counted
@@ -39,7 +40,7 @@ class Recording:
     topic, kind
         Its name, and the type of its messages.
     messages
-        As rosbags decodes them.
+        As rosbags decodes them; of odometry the poses alone, geometry_msgs/Pose.
     count
         How many messages the topic has.
     """
@@ -73,18 +74,23 @@ def read_topics(path: StrPath, kinds: Collection[str], wanted: Collection[str], 
     InvalidInputError
         If rosbags is not installed.
     FileError
-        If the bag is damaged, has no such topic, or has several and none is named.
+        If the bag is damaged, decompresses to far more than its size, has no such topic, or has several and none is named.
     """
     reader = _reader(path)
-    try:
-        with ExitStack() as stack:
-            reader.open()
-            stack.callback(reader.close)
-            return _read(path, reader, _chosen(path, _topics(reader), kinds, wanted, option))
-    except FileError:
-        raise
-    except Exception as error:  # rosbags has errors of its own, but raises any kind on damaged files
-        _refuse_damage(path, error)
+    files = [file for file in Path(path).iterdir() if file.is_file()] if Path(path).is_dir() else [Path(path)]
+    with decompression.limited(path, sum(file.stat().st_size for file in files)):
+        try:
+            for file in files:
+                if file.suffix == ".zstd":  # which the reader unpacks into the system's folder of temporary files
+                    decompression.check_file(file)
+            with ExitStack() as stack:
+                reader.open()
+                stack.callback(reader.close)
+                return _read(path, reader, _chosen(path, _topics(reader), kinds, wanted, option))
+        except FileError:
+            raise
+        except Exception as error:  # rosbags has errors of its own, but raises any kind on damaged files
+            _refuse_damage(path, error)
 
 
 def _topics(reader: Any) -> dict[str, tuple[str, int]]:
@@ -99,13 +105,16 @@ def _topics(reader: Any) -> dict[str, tuple[str, int]]:
 def _read(path: StrPath, reader: Any, names: list[str]) -> list[Recording]:
     """The messages of these topics."""
     found: list[Recording] = []
+    by_message = reader.metadata.compression_mode == "message" if _format(path) == _FOLDER else False
+    if by_message:
+        reader.metadata = reader.metadata._replace(compression_mode=None)  # messages are decompressed here
     for name in names:
         connections = [connection for connection in reader.connections if connection.topic == name]
         kind = connections[0].msgtype
         raw: deque[bytes] = deque(maxlen=None if kind == ODOMETRY else 1)
         count = 0
         for count, (_, _, data) in enumerate(reader.messages(connections), start=1):  # noqa: B007
-            raw.append(data)
+            raw.append(decompression.decompressed(data) if by_message else data)
         if count == 0:
             raise FileError(path, f"expected messages on {_shown(name)}, got none")
         found.append(Recording(name, kind, _decoded(kind, raw, ros_1=_format(path) == _ROS_1), count))
@@ -165,14 +174,18 @@ def _shown(name: str) -> str:
 
 def _decoded(kind: str, raw: Iterable[bytes], *, ros_1: bool) -> tuple[Any, ...]:
     """Messages by the first release whose definition fits them."""
+
+    def kept(message: Any) -> Any:
+        return message.pose.pose if kind == ODOMETRY else message
+
     if ros_1:
         store = _definitions("ROS1_NOETIC")
-        return tuple(store.deserialize_ros1(data, kind) for data in raw)
+        return tuple(kept(store.deserialize_ros1(data, kind)) for data in raw)
     misfit: Exception = ValueError("no message")
     for release in _RELEASES:
         store = _definitions(release)
         try:
-            return tuple(store.deserialize_cdr(data, kind) for data in raw)
+            return tuple(kept(store.deserialize_cdr(data, kind)) for data in raw)
         except Exception as error:  # also what a wrong definition makes of a sound message
             misfit = error
     raise misfit

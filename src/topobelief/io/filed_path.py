@@ -18,7 +18,11 @@ _UNIT_TOLERANCE = 0.01  # on the length of a quaternion, which files may give in
 
 @dataclass(frozen=True, eq=False)
 class FiledPath(ReadOnlyArrays):
-    """Poses of shape (N, 3): x and y in metres and yaw in radians, world frame; and their lines, counted from 1."""
+    """Poses in the world frame, and the line of each, counted from 1.
+
+    `poses` has shape (N, 7), x, y, z in metres and a unit quaternion (x, y, z, w); where the file has no heights (N, 3), x and
+    y in metres and yaw in radians.
+    """
 
     poses: FloatArray
     lines: tuple[int, ...]
@@ -26,9 +30,28 @@ class FiledPath(ReadOnlyArrays):
     def __post_init__(self) -> None:
         object.__setattr__(self, "poses", frozen_floats(self.poses, name="poses"))
 
+    @property
+    def in_plane(self) -> FloatArray:
+        """x, y and yaw, shape (N, 3): without heights and tilts."""
+        if self.poses.shape[1] == 3:
+            return self.poses
+        return np.column_stack([self.poses[:, :2], headings_of_quaternions(self.poses[:, 3:])])
+
+    def in_space(self, path: StrPath) -> FloatArray:
+        """x, y, z and quaternions, shape (N, 7), as the file at `path` has them.
+
+        Raises
+        ------
+        FileError
+            Where it has no heights.
+        """
+        if self.poses.shape[1] == 3:
+            raise FileError(path, "expected a path with heights, got x and y alone; add the column z", line=self.lines[0])
+        return self.poses
+
 
 def path_of_quaternions(path: StrPath, rows: Sequence[Sequence[float]], lines: Sequence[int]) -> FiledPath:
-    """A path from rows x, y, qx, qy, qz, qw.
+    """A path from rows x, y, z, qx, qy, qz, qw.
 
     Raises
     ------
@@ -36,8 +59,7 @@ def path_of_quaternions(path: StrPath, rows: Sequence[Sequence[float]], lines: S
         Names the line of a quaternion whose length is not 1.
     """
     numbers = np.array(rows, dtype=np.float64)
-    headings = headings_of_quaternions(unit_quaternions(path, numbers[:, 2:], lines))
-    return FiledPath(np.column_stack([numbers[:, :2], headings]), tuple(lines))
+    return FiledPath(np.column_stack([numbers[:, :3], unit_quaternions(path, numbers[:, 3:], lines)]), tuple(lines))
 
 
 def unit_quaternions(path: StrPath, quaternions: FloatArray, lines: Sequence[int]) -> FloatArray:

@@ -17,6 +17,9 @@ from topobelief.errors import FileError
 
 StrPath = str | os.PathLike[str]
 
+EXPANSION = 100
+"""Bytes, or pixels, that each byte of a compressed file may stand for: a few kilobytes can be made to stand for gigabytes."""
+
 
 def read_text(path: StrPath, *, any_encoding: bool = False) -> str:
     """The content of a text file.

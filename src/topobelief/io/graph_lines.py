@@ -272,14 +272,14 @@ class _Reader:
         matrices = np.zeros((len(entries), kappa, kappa))
         matrices[:, rows, columns] = entries
         if order in self.dialect.roots:
-            with np.errstate(over="ignore"):
+            with np.errstate(over="ignore", invalid="ignore"):
                 return matrices.mT @ matrices
         matrices[:, columns, rows] = entries
         if order in self.dialect.inverses:
             invertible = positive_definite(matrices)
             matrices[invertible] = np.linalg.inv(matrices[invertible])
             matrices[~invertible] = 0.0
-            matrices = (matrices + matrices.mT) / 2
+            matrices = matrices / 2 + matrices.mT / 2
         return matrices
 
     def _definite(self, entries: FloatArray) -> tuple[FloatArray, BoolArray]:

@@ -159,7 +159,10 @@ class LandmarkLines:
             if ids[0] not in known:
                 message = f"expected an observation by a pose, got one by {node_name(ids[0])}, which no other line names"
                 raise FileError(self.path, message, line=number)
-            measurements[row], block, reading = self._read(tag, ids, numbers, number)
+            with np.errstate(over="ignore", invalid="ignore"):
+                measurements[row], block, reading = self._read(tag, ids, numbers, number)
+            if not np.isfinite(measurements[row]).all():
+                raise FileError(self.path, f"expected a landmark within reach of numbers for {tag}, got another", line=number)
             if not positive_definite(block[None])[0]:
                 what = "covariance" if tag in _COVARIANCES else "information matrix"
                 raise FileError(self.path, f"expected a positive definite {what} for {tag}, got another", line=number)
@@ -196,7 +199,7 @@ class LandmarkLines:
         pose = SE3_GROUP.normalized(np.array(stated))
         turn = SE3_GROUP.rotation_matrix(pose)
         information = turn @ _symmetric(numbers[3:]) @ turn.T
-        return turn @ np.array(numbers[:3]) + pose[:3], (information + information.T) / 2, POSITION.name
+        return turn @ np.array(numbers[:3]) + pose[:3], information / 2 + information.T / 2, POSITION.name
 
     def renamed(self, landmarks: IntArray, poses: IntArray) -> IntArray:
         """Ids of landmarks in the graph: their own, or symbols where one is that of a pose."""

@@ -17,7 +17,7 @@ _EXPECTED = "a nav_msgs/Path with its list of poses"
 
 
 def read_nav_path(path: StrPath) -> FiledPath:
-    """Read one nav_msgs/Path; stamps, the frame, heights and tilts do not matter.
+    """Read one nav_msgs/Path; stamps and the frame do not matter.
 
     Raises
     ------
@@ -35,8 +35,8 @@ def read_nav_path(path: StrPath) -> FiledPath:
             item.refuse("all poses", "a list that is cut short; print it with `ros2 topic echo --full-length`")
         pose = _child(item, "pose", "a pose with its header")
         position, orientation = (_child(pose, name, f"the field {name}") for name in ("position", "orientation"))
-        x_y = [_child(position, name, f"the field {name}").number() for name in "xy"]
-        rows.append(x_y + [_child(orientation, name, f"the field {name}").number() for name in "xyzw"])
+        parts = ((position, "xyz"), (orientation, "xyzw"))
+        rows.append([_child(part, name, f"the field {name}").number() for part, names in parts for name in names])
         lines.append(item.line)
     return path_of_quaternions(path, rows, lines)
 

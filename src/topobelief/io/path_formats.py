@@ -37,31 +37,34 @@ _WRITERS: dict[str, Callable[[FloatArray], str]] = {
 _Found = TypeVar("_Found")
 
 
-def read_path(path: StrPath) -> FloatArray:
+def read_path(path: StrPath, *, in_space: bool = False) -> FloatArray:
     """Read a path by the suffix of its file.
 
     Parameters
     ----------
     path
-        .csv (x,y or x,y,yaw), .tum or .txt (TUM: timestamp x y z qx qy qz qw), .yaml, .yml or .json (nav_msgs/Path, as
-        `ros2 topic echo` prints it).
+        .csv (x,y or x,y,yaw; in space x,y,z or x,y,z,qx,qy,qz,qw), .tum or .txt (TUM: timestamp x y z qx qy qz qw), .yaml,
+        .yml or .json (nav_msgs/Path, as `ros2 topic echo` prints it).
+    in_space
+        Whether to read heights and orientations.
 
     Returns
     -------
-    shape (N, 3)
-        x and y in metres, yaw in radians; where a CSV has no yaw, the direction in which a pose is reached. Heights, tilts
-        and times are left out.
+    shape (N, 3), or in space (N, 7)
+        x and y in metres, yaw in radians; in space x, y, z in metres and a unit quaternion (x, y, z, w). Where a CSV has
+        neither yaw nor quaternions, a pose is upright and heads as it is reached. Times are left out.
 
     Raises
     ------
     FileError
-        For another suffix, and where the file is not what it should be; names the line.
+        For another suffix, where the file is not what it should be, and in space where it has no heights; names the line.
     """
-    return read_filed_path(path).poses
+    filed = read_filed_path(path)
+    return filed.in_space(path) if in_space else filed.in_plane
 
 
 def read_filed_path(path: StrPath) -> FiledPath:
-    """As `read_path`, with the line of each pose."""
+    """As the file has them, with the line of each pose."""
     return _by_suffix(path, _READERS)(path)
 
 
@@ -71,9 +74,9 @@ def write_path(path: StrPath, poses: ArrayLike) -> None:
     Parameters
     ----------
     path
-    poses : shape (N, 3)
-        x and y in metres, yaw in radians; `path_poses` gives them. In TUM the times count poses; a nav_msgs/Path has stamps of
-        0 and the frame "map".
+    poses : shape (N, 3) or (N, 7)
+        As `read_path` gives them; `path_poses` adds the yaw to x and y. In TUM the times count poses; a nav_msgs/Path has
+        stamps of 0 and the frame "map".
 
     Raises
     ------

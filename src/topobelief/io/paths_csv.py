@@ -1,4 +1,9 @@
-"""Paths in CSV: a pose a line, `x,y` or `x,y,yaw`, metres and radians, with or without these names as header; # comments."""
+"""Paths in CSV, a pose a line, metres and radians; # begins a comment.
+
+    x,y        x,y,yaw        x,y,z        x,y,z,qx,qy,qz,qw
+
+These names are the header, which may be left out; three columns without one are x, y and yaw.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +11,17 @@ import numpy as np
 
 from topobelief.arrays import FloatArray
 from topobelief.errors import FileError
-from topobelief.geometry.planar import travel_headings
-from topobelief.io.filed_path import FiledPath, finite_numbers, numbered_lines
+from topobelief.geometry.planar import quaternions_of_headings, travel_headings
+from topobelief.io.filed_path import FiledPath, finite_numbers, numbered_lines, path_of_quaternions
 from topobelief.io.files import StrPath, read_text
 
-_HEADERS = (["x", "y"], ["x", "y", "yaw"])
+_PLANAR, _SPATIAL = ["x", "y", "yaw"], ["x", "y", "z", "qx", "qy", "qz", "qw"]
+_HEADERS = (_PLANAR[:2], _PLANAR, _SPATIAL[:3], _SPATIAL)
+_EXPECTED = "x,y or x,y,yaw, in space x,y,z or x,y,z,qx,qy,qz,qw"
 
 
 def read_csv_path(path: StrPath) -> FiledPath:
-    """Read a path in CSV; without a column yaw each pose heads as it is reached.
+    """Read a path in CSV; without a column yaw or quaternions each pose is upright and heads as it is reached.
 
     Raises
     ------
@@ -31,21 +38,25 @@ def read_csv_path(path: StrPath) -> FiledPath:
             if header in _HEADERS:
                 names = header
                 continue
-            if len(fields) not in (2, 3) or fields[0][:1].isalpha():
-                raise FileError(path, f"expected the columns x,y or x,y,yaw, got {line[:60]!r}", line=number)
-            names = _HEADERS[len(fields) - 2]
+            names = next((each for each in _HEADERS if len(each) == len(fields)), list[str]())
+            if not names or fields[0][:1].isalpha():
+                raise FileError(path, f"expected the columns {_EXPECTED}, got {line[:60]!r}", line=number)
         rows.append(finite_numbers(path, number, fields, " ".join(names)))
         lines.append(number)
     if not rows:
-        raise FileError(path, "expected at least one pose x,y or x,y,yaw, got none")
+        raise FileError(path, f"expected at least one pose {_EXPECTED}, got none")
     poses = np.array(rows)
-    if poses.shape[1] == 2:
-        poses = np.column_stack([poses, travel_headings(poses)])
+    if names == _SPATIAL:
+        return path_of_quaternions(path, rows, lines)
+    if names != _PLANAR:
+        headings = travel_headings(poses[:, :2])
+        turned = quaternions_of_headings(headings) if "z" in names else headings
+        poses = np.column_stack([poses, turned])
     return FiledPath(poses, tuple(lines))
 
 
 def csv_of_path(poses: FloatArray) -> str:
-    """The text of a CSV file of poses of shape (N, 3), or (N, 7), which `read_csv_path` does not read."""
+    """The text of a CSV file of poses of shape (N, 3) or (N, 7)."""
     rows: list[list[float]] = poses.tolist()
-    names = ["x", "y", "yaw"] if poses.shape[1] == 3 else ["x", "y", "z", "qx", "qy", "qz", "qw"]
+    names = _PLANAR if poses.shape[1] == 3 else _SPATIAL
     return "".join(f"{','.join(map(str, row))}\n" for row in (names, *rows))

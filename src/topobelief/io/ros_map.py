@@ -25,7 +25,7 @@ from PIL import Image, ImageFile, UnidentifiedImageError
 
 from topobelief.arrays import BoolArray, FloatArray
 from topobelief.errors import FileError, InvalidInputError, InvalidMapError, MapWarning, require_positive
-from topobelief.io.files import StrPath, atomic_file
+from topobelief.io.files import EXPANSION, StrPath, atomic_file
 from topobelief.io.yaml_fields import Field, read_fields
 from topobelief.world import World
 
@@ -39,6 +39,7 @@ _DAMAGE = (ArithmeticError, EOFError, LookupError, NotImplementedError, SyntaxEr
 """What Pillow's decoders raise on damaged images, besides OSError."""
 
 MAX_PIXELS = 150_000_000  # some 1.2 GB and 8 s
+_ALWAYS_PIXELS = 30_000_000  # that an image may have however few bytes it was compressed to
 SMALLEST_RESOLUTION, LARGEST_RESOLUTION = 1e-6, 1e6  # metres a pixel
 _COARSE = 2.0  # metres a pixel, above which millimetres are more likely
 MAX_CELLS_AWAY = 1e9  # from the origin of the world, at which coordinates still resolve a millionth of a cell
@@ -218,6 +219,13 @@ def _require_pixels_of_maps(image: Image.Image, path: Path) -> None:
     width, height = image.size
     if width * height > MAX_PIXELS:
         raise _too_large(path, f"{width} x {height}")
+    size = path.stat().st_size
+    if width * height > max(_ALWAYS_PIXELS, EXPANSION * size):
+        raise FileError(
+            path,
+            f"expected an image of at most {_ALWAYS_PIXELS / 1e6:g} million pixels, or {EXPANSION} for each byte, got "
+            f"{width} x {height} in {size} bytes; crop the map, or save it as a PGM, which is not compressed",
+        )
     if image.mode == "F" or (image.mode == "I" and image.format not in ("PNG", "PPM")):  # there Pillow's I is 16 bits
         kind = "floating-point numbers" if image.mode == "F" else "signed or 32-bit integers"
         raise FileError(

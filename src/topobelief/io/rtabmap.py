@@ -30,7 +30,7 @@ from topobelief.graph.dead_reckoning import dead_reckoned_poses
 from topobelief.graph.information import positive_definite
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.graph.topology import Topology
-from topobelief.io.files import StrPath
+from topobelief.io.files import EXPANSION, StrPath
 from topobelief.io.part import wanted_part
 from topobelief.io.reading import ReadGraph, ReadingOptions, by_option
 from topobelief.io.transforms import poses_of_matrices
@@ -268,7 +268,11 @@ class _Database:
         rows, columns = np.frombuffer(content[-12:-4], dtype="<i4").tolist() if len(content) > 12 else (0, 0)
         expected = rows * columns * np.dtype(kind).itemsize
         try:
-            raw = zlib.decompressobj().decompress(content[:-12], max(expected, 1)) if 0 < expected <= 100 * self._size else b""
+            raw = (
+                zlib.decompressobj().decompress(content[:-12], max(expected, 1))
+                if 0 < expected <= EXPANSION * self._size
+                else b""
+            )
         except zlib.error:
             raw = b""
         if len(raw) != expected or not raw:

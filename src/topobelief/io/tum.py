@@ -14,7 +14,7 @@ _COLUMNS = "timestamp x y z qx qy qz qw"
 
 
 def read_tum_path(path: StrPath) -> FiledPath:
-    """Read a path in TUM format; times, heights and tilts do not matter in the plane.
+    """Read a path in TUM format; its times do not matter.
 
     Raises
     ------
@@ -22,7 +22,7 @@ def read_tum_path(path: StrPath) -> FiledPath:
         Names the line that is not what it should be.
     """
     rows, lines = tum_rows(path)
-    return path_of_quaternions(path, rows[:, [1, 2, 4, 5, 6, 7]].tolist(), lines)
+    return path_of_quaternions(path, rows[:, 1:].tolist(), lines)
 
 
 def tum_rows(path: StrPath) -> tuple[FloatArray, list[int]]:

@@ -10,15 +10,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from topobelief.arrays import FloatArray
-from topobelief.candidates.polyline import checked_path, path_length
-from topobelief.candidates.roadmap_graph import Roadmap, free_edges
+from topobelief.candidates.polyline import path_length
+from topobelief.candidates.roadmap_graph import Roadmap, with_way
 from topobelief.search.evaluations import SAME_VALUE, Evaluations
-from topobelief.search.walks import Walk
 
 _BATCH = 16  # changes of which the best is kept
 _MOST_DRAWS = 20  # for each of them; most of the others leave free space or are too long
@@ -28,7 +27,6 @@ _SPREAD = (-0.7, 0.3)  # decades around the step from which one move's is drawn
 _SHARES = (0.7, 0.85)  # up to which a draw moves waypoints, leaves one out; beyond it puts one in
 _STRETCH = 0.4  # of the moves take up to two waypoints more along
 _PATIENCE = 10  # batches without a better way after which the search rests
-_SAME_PLACE = 1e-9  # metres
 _MOST_EVALUATIONS = 800
 
 
@@ -162,20 +160,3 @@ def refine_best(
     evaluations.vertices = more.vertices
     evaluations.evaluate([way])
     return interrupted
-
-
-def with_way(roadmap: Roadmap, path: FloatArray) -> tuple[Roadmap, Walk]:
-    """The roadmap with the waypoints of a free path as vertices, after its own, and the path as a walk on it.
-
-    Waypoints are joined along the path and to their neighbours.
-    """
-    path = checked_path(path)
-    apart = np.linalg.norm(roadmap.vertices[None] - path[:, None], axis=2)
-    nearest, known = apart.argmin(axis=1), apart.min(axis=1) <= _SAME_PLACE
-    count = len(roadmap.vertices)
-    walk = np.where(known, nearest, count + np.cumsum(~known) - 1)
-    vertices = np.concatenate([roadmap.vertices, path[~known]])
-    along = np.sort(np.stack([walk[:-1], walk[1:]], axis=1), axis=1)
-    joined = free_edges(roadmap.world, vertices, roadmap.robot_radius, of=np.arange(count, len(vertices)))
-    edges = np.unique(np.concatenate([roadmap.edges, along, joined]), axis=0)
-    return replace(roadmap, vertices=vertices, edges=edges), tuple(walk.tolist())

@@ -24,7 +24,7 @@ from topobelief.candidates.ends import SAME_PLACE, checked_place, shown_place
 from topobelief.candidates.learned_closures import learn_closures
 from topobelief.candidates.observations import ObservationModel, learn_observations
 from topobelief.candidates.predicted_factors import closure_information, default_information, predict_actions
-from topobelief.candidates.roadmap import Roadmap
+from topobelief.candidates.roadmap_graph import Roadmap, with_way
 from topobelief.candidates.start import Start, find_start
 from topobelief.errors import InvalidInputError, PlanningError, require_choice
 from topobelief.graph.action import Action
@@ -38,7 +38,7 @@ from topobelief.search.evaluations import Evaluations
 from topobelief.search.front import below_front, on_front
 from topobelief.search.front_bounds import FrontBounds
 from topobelief.search.local_search import LocalSearch, spread_vias
-from topobelief.search.refinement import refine_best, with_way
+from topobelief.search.refinement import refine_best
 from topobelief.search.result import SearchResult, Way
 from topobelief.search.topological_prior import OBJECTIVES, constant
 from topobelief.search.walk_bounds import walk_bounds
