@@ -95,7 +95,7 @@ def expected_errors(
     square, variance = inverse_traces(
         fisher_rows(after).joint(),
         after.num_nodes,
-        [(alignment.nodes, alignment.columns(kappa)), (ends, _relative_position(after, start, goal)[: len(ends)])],
+        [alignment.projection, (ends, _relative_position(after, start, goal)[: len(ends)])],
     )
     map_rmse = (1 / alignment.count * square).root().known_length("expected error of the map")
     goal_std = variance.root().known_length("standard deviation of the last pose") if goal > start else Estimate(0.0, 0.0)

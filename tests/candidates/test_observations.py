@@ -63,6 +63,21 @@ def test_a_model_is_learned_from_the_graph():
     assert learn_observations(graph_of([])) is None
 
 
+def test_landmarks_that_were_seen_where_the_world_shows_no_sight_are_seen_there_again():
+    """Trees beside the region along the trajectory; in a world in which most were seen along free lines, walls hide the rest."""
+    landmarks = [(i + 0.5, 3.0) for i in range(12)]
+    graph = graph_of(landmarks, seen=[(i, i) for i in range(12)], poses=[(i, 0, 0) for i in range(12)])
+    lane = tb.World.from_trajectory(graph, 1.0)
+    model = learn_observations(graph, world=lane)
+    assert not model.line_of_sight
+    assert "in sight or not" in str(model)
+    assert [pair for pair in observations_from(graph, graph.poses[:1], model, world=lane).tolist()] == [[0, 12]]
+    walled = tb.World.from_boxes([(2.2, 1, 4.8, 2)], bounds=(-5, -5, 20, 5))
+    model = learn_observations(graph, world=walled)
+    assert model.line_of_sight
+    assert observations_from(graph, graph.poses[3:4], model, world=walled).tolist() == []
+
+
 def test_actions_observe_landmarks_with_their_expected_information():
     """A path past two landmarks: observations come last, new pose -> landmark, and new poses count behind the landmarks."""
     graph = graph_of([(2, 1), (4, 1)], seen=[(0, 0), (1, 1)])

@@ -223,7 +223,7 @@ def _gtsam_marginals(graph: PoseGraph) -> Callable[[Action], Evaluate]:
     """Linearise and eliminate the whole posterior; the joint covariance of the sample gives E."""
     gtsam, alignment = load_gtsam(), Alignment.of(graph.positions, DEFAULT_SAMPLE_SIZE)
     k, kappa, count = graph.group.position_dim, graph.tangent_dim, alignment.count
-    projection = alignment.columns(k).reshape(count * k, count * k)
+    projection = alignment.projection.columns(k).reshape(count * k, count * k)
     positions = (kappa * np.arange(count)[:, None] + np.arange(k)).ravel()
 
     def ready(action: Action) -> Evaluate:

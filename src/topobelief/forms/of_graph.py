@@ -121,7 +121,7 @@ class GraphForms(Forms[float]):
         if name == "positions":
             return self._positions[1].trace
         form, alignment = _blocks(self._rows, name), self._alignment
-        [trace] = inverse_traces(form, self.graph.num_nodes, [(alignment.nodes, alignment.columns(form.block_size))])
+        [trace] = inverse_traces(form, self.graph.num_nodes, [alignment.projection])
         return trace
 
     def coupled_trace(self, rotations: RotationsName) -> Estimate[float]:
@@ -148,7 +148,7 @@ class GraphForms(Forms[float]):
         """Columns Pi on all poses, and what I_pp^-1 makes of them."""
         form = _blocks(self._rows, "positions")
         columns = np.zeros((self.graph.num_nodes, form.block_size, self._alignment.count * self.split[0]))
-        columns[self._alignment.nodes] = self._alignment.columns(form.block_size)
+        columns[self._alignment.nodes] = self._alignment.projection.columns(form.block_size)
         solver = InverseSolver(self.graph.edges, self.graph.num_nodes, form.strongest_node())
         return columns, solver.solve(form, columns)
 

@@ -139,12 +139,9 @@ class PriorFactors:
     def solutions(self, name: SolvedName) -> Solutions:
         """M^-1 C of the columns of a projection of positions: Pi, or Pi_n for trees, and tr(C^T M^-1 C)."""
         if name not in self._solutions:
-            sample = self.alignment.nodes
-            if name == "trees_p":
-                columns = centring(len(sample))[:, None]
-            else:
-                columns = self.alignment.columns(form_of(name, self).block_size)
-            self._solutions[name] = solutions(self.factor(name, 0.0), sample, columns)
+            factor, alignment = self.factor(name, 0.0), self.alignment
+            projection = centring(alignment.nodes) if name == "trees_p" else alignment.projection
+            self._solutions[name] = solutions(factor, projection.nodes, projection.columns(factor.block_size))
         return self._solutions[name]
 
     @cached_property
