@@ -7,11 +7,13 @@ Most public files hold dead reckoning, far from the minimum. The search therefor
    Weights are those of the rotation with the position marginalised, |O_r|p|^(1/q).
 2. Positions by linear least squares, exact for given rotations.
 3. Gauss-Newton on all poses, with exact Jacobians of the residual that `PoseGraph.chi2` squares. Its step is a direction of
-   descent; it is made longer or shorter as a parabola through chi^2 says, and halved until chi^2 falls; after each, positions are solved for again (variable projection, Golub and
-   Pereyra 1973), so that a rotation is not held back by positions that would have to move with it.
+   descent; it is made longer or shorter as a parabola through chi^2 says, and halved until chi^2 falls. After each, positions
+   are solved for again (variable projection, Golub and Pereyra 1973), so that a rotation is not held back by positions that
+   would have to move with it.
 
 Landmarks take part as points: their observations have no rows of rotations, and where these read bearings and ranges the
-estimate grows from the first pose on, and step 2 is left out. Ranges or bearings alone have no linear start: the given poses serve.
+estimate grows from the first pose on, and step 2 is left out. Ranges or bearings alone have no linear start: the given poses
+serve.
 
 All of it rests on one sparse L D L^T, which takes any information. GTSAM's optimiser, which the tests compare with, refuses
 some of these graphs: its planar initialisation (LAGO) wants diagonal noise, which csail and intel do not have, and its default
@@ -129,7 +131,7 @@ def _grown_start(graph: PoseGraph, max_iterations: int) -> FloatArray | None:
         landmarks, first = np.unique(graph.edges[seen, 1], return_index=True)
         new, by = ~np.isin(landmarks, known), seen[first]
         reckoned[landmarks[new]] = group.compose(reckoned[graph.edges[by[new], 0]], graph.measurements[by[new]])
-        known = np.sort(np.concatenate([order[:end], landmarks]))
+        known = np.sort(np.concatenate([order[:end], landmarks])).astype(np.int64)
         part = graph.part(known).with_poses(reckoned[known])
         poses[known] = _Problem(part).minimum_from(part.poses, max_iterations, precision=_ROUGH)
     return poses

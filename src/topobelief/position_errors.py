@@ -89,7 +89,6 @@ def expected_errors(
     after = graph if action is None else posterior(graph, action)
     start = int(after.pose_indices[0])
     require_determined(after, anchor=start)
-    kappa = graph.tangent_dim
     goal = after.last_pose
     ends = np.unique([start, goal])
     square, variance = inverse_traces(

@@ -95,7 +95,7 @@ def test_diagonal_blocks_of_the_inverse_are_those_of_its_solutions(group, strong
 def test_a_projection_that_cancels_almost_everything_is_solved_for():
     """A map that turns and moves as a whole, far from the pose that is held: what is left of it is small."""
     graph = ring(60, 1.0)
-    free = np.concatenate([graph.poses, graph.poses[:1] + [1e5, 0, 0]])
+    free = np.concatenate([graph.poses, graph.poses[:1] + np.array([1e5, 0, 0])])
     information = np.concatenate([graph.information, [1e-11 * np.diag([1.0, 1.0, 1e5])]])
     graph = PoseGraph(free, [*graph.edges.tolist(), (60, 0)], None, information)
     factor = PriorFactors(graph, 60).factor("joint", 0.0)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -102,7 +103,7 @@ class ObservationModel:
         return f"landmarks: {number} within {self.max_range:.3g} m{view}{walls}{chance}, {self.sigma:.3g} m{learned}"
 
 
-def learn_observations(graph: PoseGraph, *, world: FreeSpace | None = None) -> ObservationModel | None:
+def learn_observations(graph: PoseGraph, *, world: FreeSpace | None = None, **stated: Any) -> ObservationModel | None:
     """The observations that a graph's own front end made, as a model of those to come; None where there are none.
 
     `max_range` is the 90 % quantile of the distances from which landmarks were observed, `field_of_view` twice that of their
@@ -117,7 +118,10 @@ def learn_observations(graph: PoseGraph, *, world: FreeSpace | None = None) -> O
     graph
         At its estimate.
     world
-        Where given, opportunities are landmarks in sight in it, if most that were observed are. Learn with the world that you predict with.
+        Where given, opportunities are landmarks in sight in it, if most that were observed are. Learn with the world that
+        you predict with.
+    **stated
+        Attributes of the model that are not to be learned; `probability`, unless it is stated too, is learned for these.
     """
     observing = np.flatnonzero(graph.reading_codes)
     if observing.size == 0:
@@ -134,6 +138,9 @@ def learn_observations(graph: PoseGraph, *, world: FreeSpace | None = None) -> O
         line_of_sight=world is None or bool(np.mean(_in_sight(graph, graph.poses[edges[:, 0]], edges[:, 1], world)) >= _MOST),
         num_observed=len(observing),
     )
+    model = replace(model, **stated)
+    if "probability" in stated:
+        return model
     opportunities = len(observations_from(graph, graph.poses[graph.pose_indices], model, world=world))
     taken = min(len(edges), opportunities)
     return replace(model, probability=(1 + taken) / (2 + opportunities))

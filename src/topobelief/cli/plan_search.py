@@ -21,7 +21,7 @@ from topobelief.cli.plan_candidates import Proposals
 from topobelief.cli.plan_ends import Goal, shown
 from topobelief.cli.plan_world import told_of_poses_outside
 from topobelief.errors import NotOptimizedWarning
-from topobelief.graph.pose_graph import PoseGraph
+from topobelief.graph.action import staying
 from topobelief.planning.decision import Decision
 from topobelief.planning.planner import Planner
 from topobelief.search.anytime import SearchProgress
@@ -103,12 +103,11 @@ class _Listed:
 
 
 def search(
-    graph: PoseGraph,
+    planner: Planner,
     world: FreeSpace,
     begin: Start,
     goals: Sequence[Goal],
     rule: CandidateRule,
-    objective: str,
     limits: Limits,
     reporter: Reporter,
 ) -> Searched:
@@ -119,10 +118,12 @@ def search(
     PlanningError
         Where a goal cannot be reached, or not within the length.
     """
+    with reporter.stage("prior"):  # kernels are loaded and the map is factored, so that the time of the search is its own
+        planner.entropies([staying(planner.graph)])
     results: list[SearchResult] = []
     for goal in goals or [None]:
         seconds = None if limits.seconds is None else limits.seconds / max(1, len(goals))
-        found = _search_one(graph, world, begin, goal, rule, objective, replace(limits, seconds=seconds), reporter)
+        found = _search_one(planner, world, begin, goal, rule, replace(limits, seconds=seconds), reporter)
         reporter.say(_work(found, begin, goal))
         results.append(found)
     return gathered(results, goals)
@@ -157,17 +158,17 @@ def gathered(results: Sequence[SearchResult], goals: Sequence[Goal], *, points: 
 
 
 def _search_one(
-    graph: PoseGraph,
+    planner: Planner,
     world: FreeSpace,
     begin: Start,
     goal: Goal | None,
     rule: CandidateRule,
-    objective: str,
     limits: Limits,
     reporter: Reporter,
 ) -> SearchResult:
     from topobelief.search.roadmap_search import search_roadmap  # needs the extra fast
 
+    graph, objective = planner.graph, planner.objective
     place = None if goal is None else goal.place
     with reporter.stage("roadmap"), told_of_poses_outside(graph, world):
         roadmap = build_roadmap(world, begin.place, place, rule.num_vertices, rule.robot_radius, rule.seed)
@@ -194,6 +195,7 @@ def _search_one(
             start=begin,
             refine=True,
             attitude=rule.attitude,
+            planner=planner,
             seed=rule.seed,
             on_progress=lambda progress: update(progress_told(progress, objective)),
         )

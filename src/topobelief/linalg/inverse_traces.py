@@ -27,7 +27,8 @@ def inverse_traces(
     form
     num_nodes
     wanted
-        For each A the different nodes at which it is not zero, shape (t,), and what it is there, shape (t, b, s); or a projection.
+        Projections; or for each A the different nodes at which it is not zero, shape (t,), and what it is there, shape
+        (t, b, s).
     """
     held = form.strongest_node()
     if num_nodes * form.block_size > COMPILED_SIZE and has_kernels():

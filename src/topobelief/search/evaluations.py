@@ -105,8 +105,8 @@ class Evaluations:
 
     def value_with_map_alone(self, walk: Walk) -> float:
         """Of a walk if the loops that its own poses close with each other were not closed, cost included."""
-        action, num_poses = self.action(walk), self._planner.graph.num_poses
-        inner, apart = action.edges.min(axis=1) >= num_poses, np.abs(np.diff(action.edges, axis=1)[:, 0])
+        action, num_nodes = self.action(walk), self._planner.graph.num_nodes
+        inner, apart = action.edges.min(axis=1) >= num_nodes, np.abs(np.diff(action.edges, axis=1)[:, 0])
         kept = ~(inner & (apart > 1))  # odometry joins a pose to the one before
         if kept.all():
             return self.value(walk)
