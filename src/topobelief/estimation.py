@@ -227,7 +227,8 @@ class _Problem:
         if not self.linear and len(before) > _PATIENCE and before[-_PATIENCE] - chi2 <= _FLAT * chi2:
             warnings.warn(
                 f"chi^2 = {chi2:.6g} fell by less than {100 * _FLAT:g} % in {_PATIENCE} of {max_iterations} iterations: "
-                "ranges or bearings leave a flat valley, along which the estimate may still move",
+                "ranges or bearings leave a flat valley, along which the estimate may still move; what is computed holds at "
+                "these poses. For better ones, give poses to start from, measurements between poses, or more iterations",
                 NotOptimizedWarning,
                 stacklevel=3,
             )
