@@ -18,7 +18,7 @@ from topobelief.graph.pose_graph import PoseGraph
 from topobelief.graph.topology import Topology
 from topobelief.linalg import EdgeForm, Estimate, LogDetSolver
 from topobelief.linalg.inverse import InverseSolver, Solutions
-from topobelief.linalg.inverse_traces import inverse_traces
+from topobelief.linalg.inverse_traces import inverse_traces, is_compiled
 from topobelief.linalg.shear import moved_rotations, sheared_log_det
 
 _RATIO_SAFETY = 4.0  # the directions that were looked at may not contain the worst one
@@ -136,6 +136,10 @@ class GraphForms(Forms[float]):
         trace = found.trace
         error = trace.error + 2 * along.relative_error * math.sqrt(max(0.0, ratio * along.trace.value * trace.value))
         return 1 / self._alignment.count * Estimate(trace.value, error)
+
+    @property
+    def has_fast_traces(self) -> bool:
+        return is_compiled(self.graph.num_nodes * self.tangent_dim)
 
     def knows(self, form: FormName) -> bool:
         return (form, 0.0, "all") in self._known

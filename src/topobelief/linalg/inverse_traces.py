@@ -17,6 +17,11 @@ from topobelief.optional import has_kernels
 COMPILED_SIZE = 1200  # variables beyond which loading compiled kernels is worth its time, and a QR takes too long
 
 
+def is_compiled(size: int) -> bool:
+    """Whether traces of a form of so many variables are taken by compiled kernels."""
+    return size > COMPILED_SIZE and has_kernels()
+
+
 def inverse_traces(
     form: EdgeForm, num_nodes: int, wanted: list[Projection | tuple[IntArray, FloatArray]]
 ) -> list[Estimate[float]]:
@@ -31,7 +36,7 @@ def inverse_traces(
         (t, b, s).
     """
     held = form.strongest_node()
-    if num_nodes * form.block_size > COMPILED_SIZE and has_kernels():
+    if is_compiled(num_nodes * form.block_size):
         from topobelief.linalg.elimination_paths import FormFactor
         from topobelief.linalg.elimination_tree import EliminationTree
         from topobelief.linalg.selected_inverse import projected_trace
