@@ -109,7 +109,7 @@ def error_reference(
 def log_det_exact(graph: PoseGraph, part: str, *, held: Held = 0) -> Decimal:
     """The same in 80 digits, the numbers of the graph taken as they stand."""
     with localcontext(prec=DIGITS):
-        return _exact_log_det(graph.edges, *exact_rows(graph, part), _free_nodes(graph.num_poses, held))
+        return _exact_log_det(graph.edges, *exact_rows(graph, part), _free_nodes(graph.num_nodes, held))
 
 
 def exact_rows(graph: PoseGraph, part: str) -> tuple[NDArray, NDArray, NDArray]:
@@ -142,7 +142,10 @@ def _free_nodes(num_nodes: int, held: Held) -> list[int]:
 
 
 def _rows(graph: PoseGraph, part: str, frames: tuple[NDArray, NDArray]) -> tuple[NDArray, NDArray, NDArray]:
-    """Unwhitened rows on both ends of each edge, and their information."""
+    """Unwhitened rows on both ends of each edge, and their information.
+
+    An observation sees R_i^T (p_l - p_i). The first of each landmark has unit rows for its missing rotation: ln 1 = 0.
+    """
     rotations, positions = frames
     exact = rotations.dtype == object
     information = as_decimals(graph.information) if exact else graph.information
@@ -153,6 +156,21 @@ def _rows(graph: PoseGraph, part: str, frames: tuple[NDArray, NDArray]) -> tuple
     t_j_i = (rotations[j].transpose(0, 2, 1) @ (positions[i] - positions[j])[..., None])[..., 0]
     rows_i = -_adjoint(R_j_i, t_j_i)
     rows_j = np.zeros_like(rows_i) + (as_decimals(np.eye(kappa)) if exact else np.eye(kappa))
+    seen = set()
+    for edge in np.flatnonzero(graph.is_landmark[j]).tolist():
+        assert part == "joint"
+        inverse = rotations[i[edge]].T
+        rows_i[edge], rows_j[edge] = 0 * rows_i[edge], 0 * rows_j[edge]
+        rows_i[edge, :k, :k], rows_j[edge, :k, :k] = -np.eye(k, dtype=int), inverse
+        at = inverse @ (positions[j[edge]] - positions[i[edge]])
+        if k == 2:
+            rows_i[edge, 0, 2], rows_i[edge, 1, 2] = at[1], -at[0]
+        else:
+            x, y, z = at
+            rows_i[edge, :k, k:] = [[0 * x, -z, y], [z, 0 * x, -x], [-y, x, 0 * x]]
+        if j[edge] not in seen:
+            rows_j[edge, k:, k:] = information[edge, k:, k:] = np.eye(kappa - k, dtype=int)
+            seen.add(j[edge])
     if part == "joint":
         return rows_i, rows_j, information
     if part == "positions":

@@ -15,13 +15,17 @@ from hypothesis import strategies as st
 
 from data_files import RECORDED, data_file
 from graphs import SE2_GROUP, SE3_GROUP, Noise, noises, pose_graphs, random_pose_graph
-from references import DIGITS, exact_rows, log_det_exact
+from landmark_graphs import landmark_sessions
+from references import DIGITS, LOG_2_PI_E, exact_rows, laplacian_log_det_exact, log_det_exact
 from topobelief.bounds import entropy_bounds
 from topobelief.entropy import joint_entropy_estimate
 from topobelief.errors import IllConditionedError, InvalidGraphError
+from topobelief.graph.action import posterior
 from topobelief.graph.fisher import fisher_rows
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg import LogDetSolver
+from topobelief.planning.planner import Planner
+from topobelief.signatures.spanning_trees import spanning_tree_signature
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -30,7 +34,9 @@ def exact_entropy(graph):
     """J in 80 digits, as a `Decimal`."""
     with localcontext(prec=DIGITS), mpmath.workdps(DIGITS):
         two_pi_e = Decimal(mpmath.nstr(2 * mpmath.pi * mpmath.e, DIGITS))
-        return (graph.num_poses - 1) * Decimal(graph.tangent_dim) / 2 * two_pi_e.ln() - log_det_exact(graph, "joint") / 2
+        num_free = (graph.num_poses - 1) * graph.tangent_dim + graph.num_landmarks * graph.group.position_dim
+        log_det = log_det_exact(graph, "joint", held=int(graph.pose_indices[0]))
+        return Decimal(num_free) / 2 * two_pi_e.ln() - log_det / 2
 
 
 def assert_covered(graph):
@@ -49,7 +55,7 @@ def assert_covered(graph):
     for family in ("fischer", "paper"):
         for determinant in ("cholesky", "hadamard"):
             try:
-                bounds = entropy_bounds(graph, family=family, determinant=determinant, anchor=graph.num_poses - 1)
+                bounds = entropy_bounds(graph, family=family, determinant=determinant, anchor=graph.last_pose)
             except IllConditionedError:
                 continue
             except InvalidGraphError:
@@ -88,6 +94,45 @@ def test_up_to_a_hundred_edge_lengths_per_radian(graph):
 @given(pose_graphs(min_poses=2, max_poses=6, max_extra=6, log_ratio=(2.0, 7.0)))
 def test_beyond_a_hundred_edge_lengths_per_radian(graph):
     assert_covered(graph)
+
+
+@settings(max_examples=80)
+@given(landmark_sessions(log_ratio=(-3.0, 5.0), max_actions=1))
+def test_with_landmarks(session):
+    assert_covered(session.graph)
+
+
+@settings(max_examples=40)
+@given(landmark_sessions(log_ratio=(-2.0, 1.0), max_actions=2), st.sampled_from(["scratch", "incremental"]))
+def test_after_actions_that_observe_landmarks_values_are_exact_and_every_family_encloses_them(session, engine):
+    graph, actions = session.graph, session.actions
+    anchor = int(graph.pose_indices[0])
+    expected = [exact_entropy(posterior(graph, action)) for action in actions]
+    found = Planner(graph, engine=engine, anchor=anchor).entropies(actions)
+    for family in ("fischer", "fischer_step", "anchored", "chain"):
+        decision = Planner(graph, engine=engine, anchor=anchor, bounds=family).decide(actions)
+        costs = [action.cost for action in actions]
+        for J, lower, upper, cost in zip(expected, decision.lower, decision.upper, costs, strict=True):
+            assert Decimal(lower - cost) - Decimal("1e-9") <= J <= Decimal(upper - cost) + Decimal("1e-9")
+    np.testing.assert_allclose(found, [float(J) for J in expected], rtol=1e-9, atol=1e-7)
+
+
+@settings(max_examples=40)
+@given(landmark_sessions(kinds=("equal", "isotropic"), max_actions=1))
+def test_the_signature_with_landmarks_is_that_of_exact_trees(session):
+    """2 tau_p over poses and landmarks, tau_r over poses alone; minus J on a tree, and never below minus the upper bound."""
+    graph = session.graph
+    k, q, anchor = graph.group.position_dim, graph.group.rotation_dim, int(graph.pose_indices[0])
+    w_p, w_r = graph.information[:, 0, 0], graph.information[:, -1, -1]
+    between = ~graph.is_landmark[graph.edges[:, 1]]
+    places = np.searchsorted(graph.pose_indices, graph.edges[between])
+    tau_p = laplacian_log_det_exact(graph.num_nodes, graph.edges, w_p, held=anchor)
+    tau_r = laplacian_log_det_exact(graph.num_poses, places, w_r[between])
+    free = (graph.num_poses - 1) * graph.tangent_dim + graph.num_landmarks * k
+    expected = float(k * tau_p + q * tau_r) / 2 - free / 2 * LOG_2_PI_E
+    found = spanning_tree_signature(graph.topology, graph.information, kinds=graph.kinds)
+    assert found == pytest.approx(expected, rel=1e-9, abs=1e-8)
+    assert -expected >= float(exact_entropy(graph)) - 1e-8
 
 
 @settings(max_examples=120)

@@ -7,11 +7,13 @@ Most public files hold dead reckoning, far from the minimum. The search therefor
    Weights are those of the rotation with the position marginalised, |O_r|p|^(1/q).
 2. Positions by linear least squares, exact for given rotations.
 3. Gauss-Newton on all poses, with exact Jacobians of the residual that `PoseGraph.chi2` squares. Its step is a direction of
-   descent and is halved until chi^2 falls; after each, positions are solved for again (variable projection, Golub and
-   Pereyra 1973), so that a rotation is not held back by positions that would have to move with it.
+   descent; it is made longer or shorter as a parabola through chi^2 says, and halved until chi^2 falls. After each, positions
+   are solved for again (variable projection, Golub and Pereyra 1973), so that a rotation is not held back by positions that
+   would have to move with it.
 
-Landmarks take part as points: their observations have no rows of rotations, and where these read bearings and ranges the search
-starts from their positions and does without step 2. Ranges or bearings alone have no linear start: the given poses serve.
+Landmarks take part as points: their observations have no rows of rotations, and where these read bearings and ranges the
+estimate grows from the first pose on, and step 2 is left out. Ranges or bearings alone have no linear start: the given poses
+serve.
 
 All of it rests on one sparse L D L^T, which takes any information. GTSAM's optimiser, which the tests compare with, refuses
 some of these graphs: its planar initialisation (LAGO) wants diagonal noise, which csail and intel do not have, and its default
@@ -20,26 +22,35 @@ elimination calls intel indeterminate because of one edge with information 2.7e1
 
 from __future__ import annotations
 
+import math
 import warnings
 from contextlib import suppress
+from typing import NamedTuple
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import breadth_first_order
 from scipy.spatial.transform import Rotation
 
 from topobelief.arrays import FloatArray
 from topobelief.errors import EstimationError, NotOptimizedWarning
 from topobelief.geometry import Group
+from topobelief.graph.dead_reckoning import dead_reckoned_poses
 from topobelief.graph.information import cholesky_roots, scalar_weights
 from topobelief.graph.observations import observations_by_kind, observed_residuals, roots_of_positions, seen_positions
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.graph.readings import BEARING_RANGE, POSITION
+from topobelief.graph.readings import BEARING_RANGE
 from topobelief.graph.well_posed import require_determined
 from topobelief.linalg.least_squares import LeastSquaresSolver
 
 _CONVERGED = 1e-10  # fall of chi^2 that the linear model still promises: 1e-5 standard deviations from the minimum
+_ROUGH = 1e-3  # the same, as a share of chi^2, where the estimate is but a start
 _ROUNDED, _ROUNDED_RELATIVE = 1e-6, 1e-12  # the same and a share of chi^2, where rounding lets it fall no more
 _SUFFICIENT = 1e-4  # share of the promised fall that a step must bring (Nocedal and Wright, section 3.1)
-_SHORTEST_STEP = 2.0**-20
+_SHORTEST_STEP, _LONGEST_STEP = 2.0**-20, 2.0
+_FEWEST_MORE, _GROWTH = 50, 1.3  # poses by which a growing estimate grows: at least so many, or by this factor
+_MOST_BENT = 4.0  # times as much as the linear model says
+_NEARLY_WHOLE = 0.2  # of ln of the best length: closer to a whole step no other is tried
 _PATIENCE, _FLAT = 50, 1e-2  # iterations, and share of chi^2: ranges alone may lead along a valley that is all but flat
 _SMALL_ANGLE = 1e-3  # below it the series of the Jacobian is exact in double precision
 
@@ -84,7 +95,7 @@ def optimize(graph: PoseGraph, *, max_iterations: int = 300) -> PoseGraph:
     problem = _Problem(graph)
     found: PoseGraph | None = None
     with suppress(EstimationError):  # the search may still succeed from the given poses
-        start = problem.chordal_start() if problem.linear else _start_by_positions(graph, max_iterations)
+        start = problem.chordal_start() if problem.linear else _grown_start(graph, max_iterations)
         if start is not None:
             found = graph.with_poses(problem.minimum_from(start, max_iterations))
     if found is not None and found.chi2 <= graph.chi2:
@@ -93,19 +104,46 @@ def optimize(graph: PoseGraph, *, max_iterations: int = 300) -> PoseGraph:
     return min((candidate for candidate in (graph, found, refined) if candidate is not None), key=lambda each: each.chi2)
 
 
-def _start_by_positions(graph: PoseGraph, max_iterations: int) -> FloatArray | None:
-    """The estimate with bearings and ranges taken for positions; None where a reading is not both."""
-    kinds = observations_by_kind(graph.reading_codes)
-    if any(not kind.linear and kind is not BEARING_RANGE for kind, _ in kinds):
+def _grown_start(graph: PoseGraph, max_iterations: int) -> FloatArray | None:
+    """The estimate of more and more of the graph, each from the one before; None where a landmark's position is not read.
+
+    Begins at the first pose and takes on others in the order of how many measurements between poses away they are, and the
+    landmarks that they see. So landmarks that were seen before correct the heading before it is far off, as in incremental
+    estimation.
+    """
+    if any(not kind.linear and kind is not BEARING_RANGE for kind, _ in observations_by_kind(graph.reading_codes)):
         return None
-    k, noise, readings = graph.group.position_dim, graph.noise.copy(), graph.readings
-    for kind, which in kinds:
-        if not kind.linear:
-            jacobian = kind.jacobian(graph.measurements[which, :k])
-            noise[which, :k, :k] = jacobian.transpose(0, 2, 1) @ noise[which, :k, :k] @ jacobian
-            readings[which] = POSITION.name
-    as_positions = PoseGraph(graph.poses, graph.edges, graph.measurements, noise, graph.kinds, ids=graph.ids, readings=readings)
-    return optimize(as_positions, max_iterations=max_iterations).poses
+    group, poses, held = graph.group, graph.poses.copy(), int(graph.pose_indices[0])
+    observed = graph.reading_codes > 0
+    odometry, shape = graph.edges[~observed], (graph.num_nodes, graph.num_nodes)
+    links = sparse.coo_array((np.ones(len(odometry)), odometry.T), shape=shape).tocsr()
+    order = breadth_first_order(links, held, directed=False, return_predecessors=False)
+    if len(order) < graph.num_poses:
+        return None  # landmarks alone join some of them
+    known, end = np.array([held]), 1
+    while end < len(order):
+        end = min(len(order), max(end + _FEWEST_MORE, int(_GROWTH * end)))
+        inside = np.isin(graph.edges, order[:end])
+        ends, seen = ~observed & inside.all(axis=1), np.flatnonzero(observed & inside[:, 0])
+        reckoned = dead_reckoned_poses(
+            group, graph.num_nodes, graph.edges[ends], graph.measurements[ends], known=known, known_poses=poses[known]
+        )
+        landmarks, first = np.unique(graph.edges[seen, 1], return_index=True)
+        new, by = ~np.isin(landmarks, known), seen[first]
+        reckoned[landmarks[new]] = group.compose(reckoned[graph.edges[by[new], 0]], graph.measurements[by[new]])
+        known = np.sort(np.concatenate([order[:end], landmarks])).astype(np.int64)
+        part = graph.part(known).with_poses(reckoned[known])
+        poses[known] = _Problem(part).minimum_from(part.poses, max_iterations, precision=_ROUGH)
+    return poses
+
+
+class _Trial(NamedTuple):
+    """Poses that a step leads to, and what they leave of the measurements."""
+
+    poses: FloatArray
+    errors: FloatArray
+    residuals: FloatArray
+    chi2: float
 
 
 class _Problem:
@@ -155,21 +193,24 @@ class _Problem:
         poses[graph.is_landmark, k:] = group.identity()[k:]
         return poses
 
-    def minimum_from(self, poses: FloatArray, max_iterations: int) -> FloatArray:
-        """Poses at a minimum of chi^2, by Gauss-Newton with step halving and variable projection."""
+    def minimum_from(self, poses: FloatArray, max_iterations: int, *, precision: float = 0.0) -> FloatArray:
+        """Poses at a minimum of chi^2, to a share of it, by Gauss-Newton with a search along its step and variable projection.
+
+        Far from the minimum or with large residuals a whole step goes too far, or not far enough. The parabola through chi^2
+        and its slope here and chi^2 there says which step is best.
+        """
         poses = self._settled(poses)
         errors, residuals = self._residuals(poses)
         chi2 = _sum_of_squares(residuals)
         before = [chi2]
         for _ in range(max_iterations):
             step, promised = _solved(self.pose_solver, *self._rows(poses, errors), residuals)
-            length = 1.0
-            while True:
-                trial = self._settled(self.group.compose(poses, self.group.exp(length * step)))
-                trial_errors, trial_residuals = self._residuals(trial)
-                trial_chi2 = _sum_of_squares(trial_residuals)
-                if trial_chi2 <= chi2 - _SUFFICIENT * length * promised:
-                    break
+            length, found = 1.0, self._moved(poses, step, 1.0)
+            best = _best_length(chi2, promised, found.chi2)
+            if abs(math.log(best)) > _NEARLY_WHOLE:
+                other = self._moved(poses, step, best)
+                length, found = (best, other) if other.chi2 < found.chi2 else (1.0, found)
+            while not found.chi2 <= chi2 - _SUFFICIENT * min(length, 1.0) * promised:
                 if promised <= _ROUNDED + _ROUNDED_RELATIVE * chi2:
                     return poses
                 length /= 2
@@ -178,14 +219,16 @@ class _Problem:
                         f"expected chi^2 to fall along the Gauss-Newton step, got stuck at {chi2:.6g}; "
                         "check the units and the information matrices for extreme ratios"
                     )
-            poses, errors, residuals, chi2 = trial, trial_errors, trial_residuals, trial_chi2
-            if promised <= _CONVERGED:
+                found = self._moved(poses, step, length)
+            poses, errors, residuals, chi2 = found
+            if promised <= _CONVERGED + precision * chi2:
                 return poses
             before.append(chi2)
         if not self.linear and len(before) > _PATIENCE and before[-_PATIENCE] - chi2 <= _FLAT * chi2:
             warnings.warn(
                 f"chi^2 = {chi2:.6g} fell by less than {100 * _FLAT:g} % in {_PATIENCE} of {max_iterations} iterations: "
-                "ranges or bearings leave a flat valley, along which the estimate may still move",
+                "ranges or bearings leave a flat valley, along which the estimate may still move; what is computed holds at "
+                "these poses. For better ones, give poses to start from, measurements between poses, or more iterations",
                 NotOptimizedWarning,
                 stacklevel=3,
             )
@@ -194,6 +237,11 @@ class _Problem:
             f"expected Gauss-Newton to converge in {max_iterations} iterations, got chi^2 = {chi2:.6g} still falling; "
             "look for wrong loop closures or allow more iterations"
         )
+
+    def _moved(self, poses: FloatArray, step: FloatArray, length: float) -> _Trial:
+        trial = self._settled(self.group.compose(poses, self.group.exp(length * step)))
+        errors, residuals = self._residuals(trial)
+        return _Trial(trial, errors, residuals, _sum_of_squares(residuals))
 
     def _settled(self, poses: FloatArray) -> FloatArray:
         """The same rotations with the positions that minimise chi^2 for them, where that is a linear problem."""
@@ -245,6 +293,17 @@ class _Problem:
             turn = self.group.rotation_matrix(poses[self.tails[which]]).transpose(0, 2, 1)
             jacobian[which] = 0.0
             jacobian[which, : read.shape[1], :k] = read @ turn
+
+
+def _best_length(chi2: float, promised: float, after: float) -> float:
+    """Where the parabola is least that has chi^2 and its slope at the beginning of a step, and chi^2 at its end; 1 is the end.
+
+    1 too where chi^2 is far from a parabola: along a bent valley halved steps get further than the best ones.
+    """
+    bend = after - chi2 + 2 * promised
+    if not promised > _ROUNDED_RELATIVE * chi2 or not bend <= _MOST_BENT * promised:
+        return 1.0
+    return promised / max(bend, promised / _LONGEST_STEP)
 
 
 def _solved(

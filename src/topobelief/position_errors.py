@@ -89,13 +89,12 @@ def expected_errors(
     after = graph if action is None else posterior(graph, action)
     start = int(after.pose_indices[0])
     require_determined(after, anchor=start)
-    kappa = graph.tangent_dim
     goal = after.last_pose
     ends = np.unique([start, goal])
     square, variance = inverse_traces(
         fisher_rows(after).joint(),
         after.num_nodes,
-        [(alignment.nodes, alignment.columns(kappa)), (ends, _relative_position(after, start, goal)[: len(ends)])],
+        [alignment.projection, (ends, _relative_position(after, start, goal)[: len(ends)])],
     )
     map_rmse = (1 / alignment.count * square).root().known_length("expected error of the map")
     goal_std = variance.root().known_length("standard deviation of the last pose") if goal > start else Estimate(0.0, 0.0)

@@ -7,7 +7,8 @@ import time
 import numpy as np
 import pytest
 
-from graphs import SE3_GROUP, Noise, random_pose_graph
+from graphs import SE2_GROUP, SE3_GROUP, Noise, random_pose_graph
+from landmark_graphs import with_landmarks
 from references import error_reference
 from topobelief import (
     PoseGraph,
@@ -226,7 +227,7 @@ def test_the_result_grows_part_by_part_and_goes_into_json(tmp_path):
         len(result.sessions) + len(result.memory) + len(result.error_bounds) + len(result.proofs) + len(result.candidates)
         for result in results
     ]
-    assert counts == [0, 1, 2, 3, 4, 5, 6, 15, 27]
+    assert counts == [0, 1, 2, 3, 4, 5, 6, 7, 16, 28]
     document = json.loads(json.dumps(results[-1].to_dict(), allow_nan=False))
     assert document["schema"] == run.SCHEMA
     assert document["plan"]["files"] == ["drive.g2o"]
@@ -291,9 +292,28 @@ def test_candidates_of_three_kinds_are_bounded_by_every_family_and_by_their_erro
     assert f"{rows[0].num_survivors} of 5" in shown
 
 
-def test_candidates_in_three_dimensions_have_no_paths_in_the_plane():
-    with pytest.raises(InvalidInputError, match="expected a graph in SE"):
-        predicted_candidates(tangle("isotropic", 20), 3, "learned", seed=0)
+@pytest.mark.parametrize("kind", ["nearest", "learned", "paper"])
+def test_candidates_in_three_dimensions_lead_to_the_same_places(kind):
+    graph = tangle("isotropic", 20)
+    actions, _ = predicted_candidates(graph, 3, kind, seed=0)
+    expected = predicted_candidates(graph, 3, "nearest", seed=0)[0]
+    for action, other in zip(actions, expected, strict=True):
+        np.testing.assert_allclose(action.poses[-1, :3], other.poses[-1, :3], atol=1e-6)
+
+
+def test_sessions_with_landmarks_agree_with_gtsam():
+    """Candidates observe landmarks as the graph's poses did; rows that need joint marginals of poses alone are left out."""
+    rng, noise = np.random.default_rng(4), Noise(SE2_GROUP, "isotropic", 100.0, 0.5, 1.0)
+    graph = with_landmarks(rng, random_pose_graph(rng, noise, 30, 10), noise, 5)
+
+    actions = candidate_paths(graph, 4, num_new_poses=5, num_closures=1, rng=rng)
+    assert sum(action.num_observations for action in actions) > 0
+    times = time_session(BenchmarkSession("seen", graph, actions), num_actions=2, repetitions=2)
+    names = {row.name for row in times.methods}
+    assert "standard BSP, GTSAM, COLAMD" in names
+    assert "rAMDL on the dense covariance" not in names
+    assert times.largest_deviation < 1e-9
+    assert "5 landmarks" in session_table(times, None).title
 
 
 def test_time_is_that_of_the_clock():

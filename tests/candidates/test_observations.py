@@ -61,6 +61,25 @@ def test_a_model_is_learned_from_the_graph():
     assert model.sigma == pytest.approx(0.2)
     assert model.probability == pytest.approx((1 + 40) / (2 + 80))
     assert learn_observations(graph_of([])) is None
+    stated = learn_observations(graph, max_range=0.1, max_per_pose=7)
+    assert (stated.max_range, stated.max_per_pose, stated.sigma) == (0.1, 7, model.sigma)
+    assert stated.probability == 1 / 2  # nothing is that near
+    assert learn_observations(graph, probability=0.3).probability == 0.3
+
+
+def test_landmarks_that_were_seen_where_the_world_shows_no_sight_are_seen_there_again():
+    """Trees beside the region along the trajectory. Where most were seen along free lines, walls hide the others."""
+    landmarks = [(i + 0.5, 3.0) for i in range(12)]
+    graph = graph_of(landmarks, seen=[(i, i) for i in range(12)], poses=[(i, 0, 0) for i in range(12)])
+    lane = tb.World.from_trajectory(graph, 1.0)
+    model = learn_observations(graph, world=lane)
+    assert not model.line_of_sight
+    assert "in sight or not" in str(model)
+    assert observations_from(graph, graph.poses[:1], model, world=lane).tolist() == [[0, 12]]
+    walled = tb.World.from_boxes([(2.2, 1, 4.8, 2)], bounds=(-5, -5, 20, 5))
+    model = learn_observations(graph, world=walled)
+    assert model.line_of_sight
+    assert observations_from(graph, graph.poses[3:4], model, world=walled).tolist() == []
 
 
 def test_actions_observe_landmarks_with_their_expected_information():

@@ -52,6 +52,7 @@ def write_files(recipe: str) -> None:
     graph = PoseGraph(poses, steps + closures(poses), None, np.diag([400.0, 400, 3000]))
     write_g2o(graph, "graph.g2o")
     write_toro(graph, "graph.toro")
+    write_g2o(_with_trees(graph), "park.g2o")
     database = Database()
     database.nodes = [(index + 1, 0, _matrix(pose)) for index, pose in enumerate(poses)]
     measured = zip(graph.edges.tolist(), graph.measurements, strict=True)
@@ -83,6 +84,17 @@ def write_files(recipe: str) -> None:
     odometry = zip(steps, graph.measurements.tolist(), strict=False)
     lines = [f"EDGE2 {i} {j} {x} {y} {theta} 20 0 0 20 0 50" for (i, j), (x, y, theta) in odometry]
     Path("isam.txt").write_text("\n".join(lines) + "\n")
+
+
+def _with_trees(graph: PoseGraph) -> PoseGraph:
+    """A tree beside each side of the square, seen by every second pose that is near it."""
+    trees = np.array([[3.0, -1.0], [7.0, 3.0], [3.0, 7.0], [-1.0, 3.0]])
+    n = graph.num_poses
+    near = np.linalg.norm(graph.positions[::2, None] - trees, axis=2) < 3
+    seen = [(2 * pose, n + tree) for pose, tree in np.argwhere(near).tolist()]
+    poses = np.concatenate([graph.poses, np.column_stack([trees, np.zeros(4)])])
+    kinds = ["pose"] * n + ["landmark"] * 4
+    return PoseGraph(poses, [*graph.edges.tolist(), *seen], None, graph.information[0], kinds)
 
 
 def _matrix(pose: np.ndarray) -> bytes:

@@ -14,7 +14,7 @@ from topobelief.graph.alignment import Alignment, sample_of
 @given(st.integers(1, 8), st.sampled_from([2, 3]), st.floats(-3, 3), st.integers(0, 2**32 - 1))
 def test_it_is_a_projection_that_no_rigid_motion_survives(count, k, decades, seed):
     positions = 10**decades * np.random.default_rng(seed).normal(size=(count, k)) + 3.0
-    projection = Alignment.of(positions, 500).columns(k).reshape(count * k, count * k)
+    projection = Alignment.of(positions, 500).projection.columns(k).reshape(count * k, count * k)
     np.testing.assert_allclose(projection, alignment_reference(positions), atol=1e-9)
     np.testing.assert_allclose(projection @ projection, projection, atol=1e-12)
     moved = np.tile(np.eye(k), (count, 1))
@@ -30,7 +30,7 @@ def test_turns_that_move_nothing_are_left_out(k, positions, turns):
 
 
 def test_other_variables_of_a_pose_are_not_seen():
-    columns = Alignment.of(np.eye(3)[:, :2], 500).columns(3)
+    columns = Alignment.of(np.eye(3)[:, :2], 500).projection.columns(3)
     assert columns.shape == (3, 3, 6)
     assert not columns[:, 2].any()
 

@@ -243,7 +243,7 @@ BAD_LINES = {
         "expected an observation by a pose, got one by 5, which no other",
     ),
     "3D landmark": ("VERTEX_TRACKXYZ 7 1 2 3", "expected lines in SE(2) as VERTEX_SE2 on line 1, got VERTEX_TRACKXYZ"),
-    "bearing alone": ("EDGE_BEARING_SE2_XY 0 7 0.1 10", "got landmarks (EDGE_BEARING_SE2_XY on line 7); leave them out"),
+    "bearing alone": ("EDGE_BEARING_SE2_XY 0 7 0.1 10", "expected a line VERTEX_XY for landmark 7, which is seen by"),
     "edge between sensors": ("EDGE_SE2_OFFSET 0 1 0 0 1 0 0", "got EDGE_SE2_OFFSET: it measures between sensors"),
     "TORO": ("VERTEX2 9 0 0 0", "got VERTEX2: it belongs to the format TORO, and a file is in one format"),
     "not a number": (f"EDGE_SE2 0 1 one 0 0 {UNIT_2D}", "expected a number for EDGE_SE2, got 'one'"),

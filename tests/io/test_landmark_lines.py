@@ -42,6 +42,24 @@ def test_g2o_lines_of_the_plane(filed):
     assert graph.fixed == (3,)
 
 
+def test_bearings_alone_place_a_landmark_that_has_a_line_of_its_own(filed, tmp_path):
+    text = (
+        PLANE + "VERTEX_XY 7 2.1 2.2\nEDGE_BEARING_SE2_XY 0 7 0.7853981633974483 400\nEDGE_BEARING_SE2_XY 1 7 -0.39269908 900\n"
+    )
+    graph = tb.read_g2o(filed(text))
+    assert graph.readings.tolist() == ["pose", "bearing", "bearing"]
+    assert graph.noise[1:, 0, 0].tolist() == [400, 900]
+    found = tb.optimize(graph)
+    assert found.chi2 < 1e-9
+    x, y = found.positions[2]
+    assert x == pytest.approx(y)
+    assert math.atan2(y, x - 1) == pytest.approx(1.5 - 0.39269908)
+    tb.write_g2o(found, tmp_path / "again.g2o")
+    again = tb.read_g2o(tmp_path / "again.g2o")
+    assert again.readings.tolist() == graph.readings.tolist()
+    assert tb.joint_entropy(again) == pytest.approx(tb.joint_entropy(found), abs=1e-9)
+
+
 def test_lines_of_gtsam_state_covariances_and_their_own_numbers(filed):
     """A covariance at 10 m is a bearing and a range; a pose and a landmark may have one number, then landmarks are symbols."""
     text = PLANE + "LANDMARK 0 1 3 4 0.4 0 0.4\nLANDMARK 1 1 1 0 0.5 0.1 0.4\nBR 0 2 0.5 2 0.1 0.2\n"
@@ -92,6 +110,15 @@ def test_landmarks_join_components_and_can_be_left_out(filed):
     ("line", "message"),
     [
         ("VERTEX_XY 7 1 2\nVERTEX_XY 7 1 2", ":5: expected one VERTEX_XY per id, got id 7 again (first on line 4)"),
+        (
+            "EDGE_BEARING_SE2_XY 0 7 0.1 9",
+            ":4: expected a line VERTEX_XY for landmark 7, which is seen by its bearing first, got",
+        ),
+        (
+            "VERTEX_XY 7 1 2\nEDGE_BEARING_SE2_XY 0 7 0.1 -9",
+            ":5: expected a positive definite information matrix for EDGE_BEAR",
+        ),
+        ("EDGE_BEARING_SE2_XY 0 7 0.1", ":4: expected 2 ids, a bearing and its information for EDGE_BEARING_SE2_XY, got 3"),
         ("EDGE_SE2_XY 0 7.5 1 2 1 0 1", ":4: expected whole ids from 0 to 2^63 - 1 for EDGE_SE2_XY, got 7.5"),
         (
             "VERTEX_XY 7 1 2\nEDGE_SE3_TRACKXYZ 0 7 0 1 1 1 1 0 0 1 0 1",

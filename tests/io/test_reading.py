@@ -63,7 +63,6 @@ FOREIGN = {
     "EDGE_PLANE_PRIOR_NORMAL 9 0 0 1 1 0 0 1 0 1": ("planes", "planes or lines"),
     "EDGE_SE2_LINE2D 0 9 1 2 1 0 1": ("planes", "planes or lines"),
     "VERTEX_POINT_XYZ 9 1 2 3": ("landmarks", "landmarks"),
-    "EDGE_BEARING_SE2_XY 0 9 0.1 10": ("landmarks", "landmarks"),
     "VERTEX_SWITCH 9 1": ("robust", "robust edges, which may turn out to be outliers"),
     "EDGE_SE2_MIXTURE 0 1 2 EDGE_SE2 0.5 0 1 EDGE_SE2 0.5 0 2": ("robust", "robust edges, which may turn out to be outliers"),
     "EQUIV 0 1": ("equiv", "pairs of poses that are to be merged into one"),

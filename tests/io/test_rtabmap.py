@@ -82,14 +82,54 @@ def test_links_to_other_things_are_refused_at_once_and_dropped_on_demand(tmp_pat
     database.links += [(1, 1, 7, unit, matrix(0)), (1, -5, 8, unit, matrix(0)), (1, 1, 9, unit, None), (2, 2, 9, unit, None)]
     path = database.write(tmp_path / "map.db")
     message = (
-        r"got 1 absolute pose and 1 sighting of a landmark and 2 directions of gravity; leave them out with --drop priors "
-        r"--drop landmarks --drop gravity \(in Python drop=\['priors', 'landmarks', 'gravity'\]\)"
+        r"got 1 absolute pose and 2 directions of gravity; leave them out with --drop priors "
+        r"--drop gravity \(in Python drop=\['priors', 'gravity'\]\)"
     )
     with pytest.raises(FileError, match=message):
         read_pose_graph(path)
     graph, notes = read_graph_file(path, ReadingOptions(drop=("priors", "landmarks", "gravity")))
     assert graph.num_edges == 4
     assert len(notes) == 3
+
+
+def test_tags_are_landmarks_seen_by_their_positions(tmp_path: Path):
+    """Tag 5 from two nodes, once from both ends; tag 6 as RTAB-Map states a point; both numbered apart from the nodes."""
+    database = Database()
+    database.optimised(1, 2, 3, 4, -5)
+    turned = np.diag([100.0, 200, 300, 400, 500, 600])
+    turned[0, 5] = turned[5, 0] = 50
+    point = np.diag([25.0, 25, 25, 1e-4, 1e-4, 1e-4])
+    database.links += [
+        (1, -5, 8, turned.tobytes(), matrix(0, 2, np.pi / 2)),
+        (2, -6, 8, point.tobytes(), matrix(3)),
+        (4, -5, 8, point.tobytes(), matrix(-3, 2)),
+        (-6, 3, 8, point.tobytes(), matrix(-2)),
+    ]
+    path = database.write(tmp_path / "map.db")
+    graph, notes = read_graph_file(path, ReadingOptions())
+    assert repr(graph) == "PoseGraph(SE(3), 4 poses, 2 landmarks, 8 edges)"
+    assert [graph.label(index) for index in range(6)] == ["1", "2", "3", "4", "l5", "l6"]
+    assert sorted(map(tuple, graph.edges[4:].tolist())) == [(0, 4), (1, 5), (2, 5), (3, 4)]
+    np.testing.assert_allclose(graph.positions[4], [5, 1, 0.5], atol=1e-6)  # as optimised
+    np.testing.assert_allclose(graph.positions[5], graph.positions[1] + SE3_GROUP.rotation_matrix(graph.poses[1]) @ [3, 0, 0.5])
+    first = graph.edges.tolist().index([0, 4])
+    along = 100 - 50**2 / 600  # the x axis of the tag is the y axis of the node
+    np.testing.assert_allclose(graph.information[first][:3, :3], np.diag([200, along, 300]), atol=1e-4)
+    assert not graph.information[first][3:].any()
+    back = graph.edges.tolist().index([2, 5])
+    np.testing.assert_allclose(graph.measurements[back, :3], [2, 0, -0.5], atol=1e-6)
+    assert notes == ("took tags for points: what is measured of their orientation is not counted",)
+    planar = read_graph_file(path, ReadingOptions(planar=True)).graph
+    assert (planar.num_landmarks, planar.tangent_dim) == (2, 3)
+    assert read_graph_file(path, ReadingOptions(drop=("landmarks",))).graph.num_landmarks == 0
+
+
+@pytest.mark.parametrize("ends", [(1, 5), (-1, -5), (0, -5), (1, -(2**40))])
+def test_a_sighting_leads_from_a_node_to_a_tag(ends, tmp_path: Path):
+    database = Database()
+    database.links.append((*ends, 8, np.eye(6).tobytes(), matrix(1)))
+    with pytest.raises(FileError, match=f"expected a node and a landmark at the ends of the link {ends[0]} - {ends[1]}"):
+        read_pose_graph(database.write(tmp_path / "map.db"))
 
 
 def test_the_database_is_not_touched(tmp_path: Path):

@@ -5,11 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from graphs import Noise, random_pose_graph
 from topobelief.forms.prior_factors import PriorFactors
+from topobelief.geometry import SE2_GROUP, SE3_GROUP
+from topobelief.graph.alignment import Alignment
 from topobelief.graph.fisher import fisher_rows
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg import inverse
 from topobelief.linalg.inverse import InverseSolver
+from topobelief.linalg.selected_inverse import inverse_diagonal, projected_trace
 from topobelief.linalg.solutions import inverse_trace, solutions
 
 
@@ -65,6 +69,41 @@ def test_compiled_solutions_are_the_same():
     np.testing.assert_allclose(found.values, expected.values, rtol=0, atol=1e-9 * np.abs(expected.values).max())
     assert found.trace.value == pytest.approx(expected.trace.value, rel=1e-10)
     assert inverse_trace(factor, np.arange(150), columns).value == pytest.approx(found.trace.value, rel=1e-12)
+
+
+@pytest.mark.parametrize("group", [SE2_GROUP, SE3_GROUP])
+@pytest.mark.parametrize("strong", [1.0, 1e9])
+def test_diagonal_blocks_of_the_inverse_are_those_of_its_solutions(group, strong):
+    """On a graph with much fill, and with a strong row, whose nodes come last."""
+    rng = np.random.default_rng(1)
+    graph = random_pose_graph(rng, Noise(group, "full", 1.0, 0.1, 1.0), 90, 120)
+    information = graph.information.copy()
+    information[7] *= strong
+    graph = PoseGraph(graph.poses, graph.edges, None, information)
+    factor, kappa = PriorFactors(graph, 9).factor("joint", 0.0), group.tangent_dim
+    every = np.arange(90)
+    columns = np.eye(90 * kappa).reshape(90, kappa, -1)
+    expected = solutions(factor, every, columns).values.reshape(90, kappa, 90, kappa)[every, :, every]
+    found = inverse_diagonal(factor, every)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+    np.testing.assert_allclose(inverse_diagonal(factor, every[40:50]), found[40:50], rtol=1e-12)
+    projection = Alignment.of(graph.positions, 50).projection
+    trace = inverse_trace(factor, projection.nodes, projection.columns(kappa))
+    assert projected_trace(factor, projection).value == pytest.approx(trace.value, rel=1e-9)
+
+
+def test_a_projection_that_cancels_almost_everything_is_solved_for():
+    """A map that turns and moves as a whole, far from the pose that is held: what is left of it is small."""
+    graph = ring(60, 1.0)
+    free = np.concatenate([graph.poses, graph.poses[:1] + np.array([1e5, 0, 0])])
+    information = np.concatenate([graph.information, [1e-11 * np.diag([1.0, 1.0, 1e5])]])
+    graph = PoseGraph(free, [*graph.edges.tolist(), (60, 0)], None, information)
+    factor = PriorFactors(graph, 60).factor("joint", 0.0)
+    projection = Alignment.of(graph.positions[:60], 60).projection
+    expected = inverse_trace(factor, projection.nodes, projection.columns(3))
+    found = projected_trace(factor, projection)
+    assert found.value == pytest.approx(expected.value, abs=found.error + expected.error)
+    assert found.error <= max(expected.error, 1e-3 * expected.value)
 
 
 def test_what_double_precision_cannot_solve_has_an_infinite_error():

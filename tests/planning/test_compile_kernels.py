@@ -29,6 +29,7 @@ def test_no_decision_compiles_anything_more():
     before = compiled_signatures()
     assert sum(len(signatures) > 0 for signatures in before.values()) > 15
     assert before["topobelief.linalg.block_cholesky.copy_columns"]
+    assert len(before["topobelief.linalg.selected_inverse._select"]) == 3  # block sizes 1, 3 and 6
     for group in (SE2_GROUP, SE3_GROUP):
         for kind in NOISES:
             rng = np.random.default_rng(1)

@@ -51,6 +51,8 @@ class Baseline:
         signatures from scratch; "error": the expected error of the map, from scratch.
     largest_graph
         Poses of the prior above which it would take minutes or more memory than there is.
+    with_landmarks
+        Whether it takes graphs with landmarks, too.
     prepare
         Called with the prior, on the clock of what is paid once per session; gives what makes an action, outside the clock,
         ready to be evaluated.
@@ -61,6 +63,11 @@ class Baseline:
     kind: BaselineKind
     largest_graph: float
     prepare: Callable[[PoseGraph], Callable[[Action], Evaluate]]
+    with_landmarks: bool = True
+
+    def takes(self, graph: PoseGraph) -> bool:
+        """Whether it suits the graph."""
+        return graph.num_poses <= self.largest_graph and (self.with_landmarks or not graph.num_landmarks)
 
 
 def baselines() -> tuple[Baseline, ...]:
@@ -69,19 +76,19 @@ def baselines() -> tuple[Baseline, ...]:
         Baseline("standard BSP, GTSAM, COLAMD", "log det I", "standard", math.inf, _gtsam_elimination("COLAMD")),
         Baseline("standard BSP, GTSAM, METIS", "log det I", "standard", math.inf, _gtsam_elimination("METIS")),
         Baseline("standard BSP, sparse LDLᵀ", "log det I", "standard", math.inf, _sparse_information),
-        Baseline("rAMDL on iSAM2's joint marginals", "log det I", "lemma", math.inf, _ramdl_on_isam2),
-        Baseline("rAMDL on the dense covariance", "log det I", "lemma", 3500, _ramdl_on_dense_covariance),
+        Baseline("rAMDL on iSAM2's joint marginals", "log det I", "lemma", math.inf, _ramdl_on_isam2, with_landmarks=False),
+        Baseline("rAMDL on the dense covariance", "log det I", "lemma", 3500, _ramdl_on_dense_covariance, with_landmarks=False),
         Baseline("t-BSP from scratch, s_ST", "tau", "topology", math.inf, _spanning_trees),
         Baseline("t-BSP from scratch, ŝ_VN", "s_VN by degrees", "topology", math.inf, _von_neumann_approx),
         Baseline("t-BSP from scratch, exact s_VN", "s_VN", "topology", 2000, _von_neumann),
-        Baseline("E from GTSAM's marginals", "E", "error", math.inf, _gtsam_marginals),
+        Baseline("E from GTSAM's marginals", "E", "error", math.inf, _gtsam_marginals, with_landmarks=False),
         Baseline("E from scratch", "E", "error", math.inf, lambda graph: lambda action: lambda: _error(graph, action)),
     )
 
 
 def anchor_of(graph: PoseGraph) -> int:
     """The pose that all methods hold."""
-    return graph.num_poses - 1
+    return graph.last_pose
 
 
 # Standard belief space planning
@@ -115,7 +122,7 @@ def _sparse_information(graph: PoseGraph) -> Callable[[Action], Evaluate]:
 
         def evaluate() -> float:
             rows = prior_rows.joined(fisher_rows(after, first_edge=graph.num_edges))
-            return _log_det(rows.joint(), after.num_poses, anchor_of(graph))
+            return _log_det(rows.joint(), after.num_nodes, anchor_of(graph))
 
         return evaluate
 
@@ -184,7 +191,8 @@ def _held_factors(graph: PoseGraph, anchor: int) -> tuple[Any, Any]:
     Relative measurements leave a rigid motion free, so that a unit prior on one pose multiplies the determinant by 1.
     """
     gtsam = load_gtsam()
-    factors, values = to_gtsam(PoseGraph(graph.poses, graph.edges, None, graph.information, ids=graph.ids))
+    fitting = PoseGraph(graph.poses, graph.edges, None, graph.noise, graph.kinds, ids=graph.ids, readings=graph.readings)
+    factors, values = to_gtsam(fitting)
     key = int(graph.ids[anchor])
     prior, pose = (
         (gtsam.PriorFactorPose2, values.atPose2) if graph.tangent_dim == 3 else (gtsam.PriorFactorPose3, values.atPose3)
@@ -223,7 +231,7 @@ def _gtsam_marginals(graph: PoseGraph) -> Callable[[Action], Evaluate]:
     """Linearise and eliminate the whole posterior; the joint covariance of the sample gives E."""
     gtsam, alignment = load_gtsam(), Alignment.of(graph.positions, DEFAULT_SAMPLE_SIZE)
     k, kappa, count = graph.group.position_dim, graph.tangent_dim, alignment.count
-    projection = alignment.columns(k).reshape(count * k, count * k)
+    projection = alignment.projection.columns(k).reshape(count * k, count * k)
     positions = (kappa * np.arange(count)[:, None] + np.arange(k)).ravel()
 
     def ready(action: Action) -> Evaluate:
@@ -253,7 +261,7 @@ def _spanning_trees(graph: PoseGraph) -> Callable[[Action], Evaluate]:
         after = posterior(graph, action)
 
         def evaluate() -> float:
-            return _log_det(laplacian_form(after.edges, np.ones(after.num_edges)), after.num_poses, anchor_of(graph))
+            return _log_det(laplacian_form(after.edges, np.ones(after.num_edges)), after.num_nodes, anchor_of(graph))
 
         return evaluate
 

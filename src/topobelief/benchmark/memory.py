@@ -11,18 +11,22 @@ import numpy as np
 
 from topobelief.benchmark.sessions import candidate_paths, city_drive
 from topobelief.errors import InvalidInputError, require_choice
+from topobelief.estimation import optimize
 from topobelief.graph.information import block_isotropic
+from topobelief.io.formats import read_pose_graph
 from topobelief.planning.planner import Planner
 
 Work = Literal["nothing", "bounds", "exact", "error"]
 
 
-def peak_gigabytes(num_poses: int, num_actions: int, work: Work, *, seed: int) -> float:
-    """Largest resident size of a new process that generates a session and decides it, 1e9 bytes.
+def peak_gigabytes(source: int | Path, num_actions: int, work: Work, *, seed: int) -> float:
+    """Largest resident size of a new process that makes a session and decides it, 1e9 bytes.
 
     Parameters
     ----------
-    num_poses, num_actions
+    source
+        Poses of a generated graph, or a file, which is read and optimised.
+    num_actions
     work
         "bounds": ranking with Fischer bounds. "exact": the joint entropy of all. "error": the expected
         error of all. "nothing": the session alone.
@@ -33,8 +37,8 @@ def peak_gigabytes(num_poses: int, num_actions: int, work: Work, *, seed: int) -
     InvalidInputError
         Where the platform does not tell a process its peak memory.
     """
-    module = "topobelief.benchmark.memory"
-    command = [sys.executable, "-m", module, str(num_poses), str(num_actions), work, str(seed)]
+    module, kind = "topobelief.benchmark.memory", "file" if isinstance(source, Path) else "generated"
+    command = [sys.executable, "-m", module, kind, str(source), str(num_actions), work, str(seed)]
     found = subprocess.run(command, check=False, capture_output=True, text=True)
     if found.returncode:
         raise InvalidInputError(f"expected a measurement of memory, got: {found.stderr.strip().splitlines()[-1:]}")
@@ -43,10 +47,13 @@ def peak_gigabytes(num_poses: int, num_actions: int, work: Work, *, seed: int) -
 
 def main(arguments: list[str]) -> None:
     """Print the peak resident size of this process after the work that the arguments name."""
-    num_poses, num_actions, work, seed = int(arguments[0]), int(arguments[1]), arguments[2], int(arguments[3])
+    kind, source, work = arguments[0], arguments[1], arguments[3]
+    num_actions, rng = int(arguments[2]), np.random.default_rng(int(arguments[4]))
     require_choice("work", work, get_args(Work))
-    rng = np.random.default_rng(seed)
-    graph = city_drive(num_poses, block_isotropic(0.1, 0.035), rng=rng)
+    if kind == "file":
+        graph = optimize(read_pose_graph(source))
+    else:
+        graph = city_drive(int(source), block_isotropic(0.1, 0.035), rng=rng)
     actions = candidate_paths(graph, num_actions, rng=rng)
     if work == "bounds":
         Planner(graph).decide(actions)

@@ -21,7 +21,6 @@ from topobelief.benchmark.timing import Clock
 from topobelief.candidates.closures import ClosureModel
 from topobelief.candidates.learned_closures import learn_closures
 from topobelief.candidates.predicted_factors import predict_actions
-from topobelief.errors import InvalidInputError
 from topobelief.graph.action import Action
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.planner import Planner
@@ -79,25 +78,19 @@ def predicted_candidates(graph: PoseGraph, count: int, candidates: Candidates, *
     Parameters
     ----------
     graph
-        In SE(2).
     count
         K; paths are the same for all kinds of candidates.
     candidates
     seed
-
-    Raises
-    ------
-    InvalidInputError
-        For a graph in SE(3), where paths in the plane say nothing.
     """
-    if graph.tangent_dim != 3:
-        raise InvalidInputError(f"expected a graph in SE(2), got {graph.num_poses} poses in SE(3)")
     rng = np.random.default_rng(seed)
     actions = candidate_paths(graph, count, num_new_poses=_NUM_NEW_POSES, num_closures=_NUM_NEAREST, rng=rng)
     if candidates == "nearest":
         return actions, f"closures: with the nearest pose in reach, {_NUM_NEAREST} a path on average"
     model = learn_closures(graph) if candidates == "learned" else ClosureModel.paper()
-    paths: list[FloatArray] = [np.vstack([graph.positions[-1:], action.poses[:, :2]]) for action in actions]
+    paths: list[FloatArray] = [
+        np.vstack([graph.positions[graph.last_pose], graph.group.position(action.poses)]) for action in actions
+    ]
     step = (actions[0].length or _NUM_NEW_POSES) / _NUM_NEW_POSES
     return tuple(predict_actions(graph, paths, closures=model, spacing=step)), str(model)
 
@@ -117,7 +110,6 @@ def bounds_of_candidates(
     ----------
     name
     graph
-        In SE(2).
     num_actions
     repetitions
         Of each timing.

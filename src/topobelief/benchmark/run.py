@@ -28,7 +28,7 @@ from topobelief.graph.pose_graph import PoseGraph
 from topobelief.io.formats import read_pose_graph
 from topobelief.runs.machine import describe_machine
 
-SCHEMA = "topobelief.benchmark/2"
+SCHEMA = "topobelief.benchmark/3"
 SIGMA_POSITION, SIGMA_ROTATIONS = 0.1, (0.01, 0.035, 0.085)  # the paper's noises, metres and radians
 SMALL = "small"
 
@@ -53,7 +53,7 @@ class BenchmarkPlan:
     num_seeds, bounds_size, bounds_actions
         Generated graphs for the error bounds, their poses and candidates.
     memory_sizes
-        Poses of generated graphs whose peak memory is measured.
+        Poses of generated graphs whose peak memory is measured, beside that of the files.
     small
         Poses and candidates of a session as the paper has them, which is measured first; None for none.
     cpu_time
@@ -107,12 +107,12 @@ class PeakMemory:
 
     Attributes
     ----------
-    num_poses, num_actions
+    name, num_actions
     session, bounds, exact, error
         Of a process that only makes the session; that ranks it with Fischer bounds; that computes J of all; E of all.
     """
 
-    num_poses: int
+    name: str
     num_actions: int
     session: float
     bounds: float
@@ -181,13 +181,14 @@ def run_benchmark(plan: BenchmarkPlan, *, progress: Progress = lambda _: None) -
         times = time_session(session, num_actions=num_actions, repetitions=repetitions, clock=clock, progress=tell)
         seconds = {**(result.degree_seconds or {}), name: degree_seconds(session, repetitions=repetitions, clock=clock)}
         result = replace(result, sessions=(*result.sessions, times), degree_seconds=seconds)
-        if graph.tangent_dim == 3 and name in {path.stem for path in plan.files}:
+        if name in {path.stem for path in plan.files}:
             graphs[name] = graph
         yield result
-    for size in plan.memory_sizes if plan.sizes else ():
-        progress(f"memory at {size} poses")
-        works = [peak_gigabytes(size, plan.num_actions, work, seed=plan.seed) for work in get_args(Work)]
-        result = replace(result, memory=(*result.memory, PeakMemory(size, plan.num_actions, *works)))
+    for source in (*(plan.memory_sizes if plan.sizes else ()), *plan.files):
+        name = source.stem if isinstance(source, Path) else f"generated, {source}"
+        progress(f"memory: {name}")
+        works = [peak_gigabytes(source, plan.num_actions, work, seed=plan.seed) for work in get_args(Work)]
+        result = replace(result, memory=(*result.memory, PeakMemory(name, plan.num_actions, *works)))
         yield result
     for closures in get_args(ClosureStyle) if plan.sizes else ():
         progress(f"error bounds, closures {closures}")
@@ -202,6 +203,8 @@ def run_benchmark(plan: BenchmarkPlan, *, progress: Progress = lambda _: None) -
         result = replace(result, error_bounds=(*result.error_bounds, found))
         yield result
     for name, graph in graphs.items():
+        if graph.tangent_dim == 6 or graph.num_landmarks:  # the paper's noises are those of poses in the plane
+            continue
         result = replace(result, proofs=(*result.proofs, *_proofs(name, graph, plan, progress)))
         yield result
     for name, graph in graphs.items():

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial import KDTree
 
 from topobelief.arrays import FloatArray, IntArray
+from topobelief.candidates.observations import learn_observations, observations_from
 from topobelief.candidates.predicted_factors import default_information
 from topobelief.errors import InvalidInputError, require_choice
 from topobelief.graph.action import Action
@@ -141,7 +142,8 @@ def candidate_paths(
     """Paths from the last pose towards random poses of the graph, each of a chain of new poses and some closures.
 
     Steps are as long as the graph's median odometry step. A new pose closes a loop with the nearest old one if that lies
-    within a radius, the same for all paths: the one at which they close as many loops as were asked for on average.
+    within a radius, the same for all paths: the one at which they close as many loops as were asked for on average. It
+    observes landmarks as the graph's own poses did (`learn_observations`), each with its expected information.
 
     Parameters
     ----------
@@ -152,7 +154,7 @@ def candidate_paths(
     num_new_poses, num_closures
         Of each path, the closures on average; at most as many as new poses.
     information : shape (kappa, kappa), optional
-        Of every predicted factor. Default: `default_information(graph)`.
+        Of every predicted factor between poses. Default: `default_information(graph)`.
     rng
 
     Raises
@@ -166,23 +168,29 @@ def candidate_paths(
             f"got {count} paths of {num_new_poses} new poses and {num_closures} closures"
         )
     matrix = np.array(default_information(graph) if information is None else information, dtype=np.float64)
-    positions = graph.positions
-    old_poses = KDTree(positions)
-    steps = np.linalg.norm(positions[graph.edges[:, 1]] - positions[graph.edges[:, 0]], axis=1)
-    odometry = np.abs(graph.edges[:, 1] - graph.edges[:, 0]) == 1
+    poses, n = graph.poses_alone, graph.num_nodes
+    steps = np.linalg.norm(poses.positions[poses.edges[:, 1]] - poses.positions[poses.edges[:, 0]], axis=1)
+    odometry = np.abs(poses.edges[:, 1] - poses.edges[:, 0]) == 1
     step = float(np.median(steps[odometry if odometry.any() else slice(None)])) or 1.0
-    n, edges_of_chain = graph.num_poses, np.arange(graph.num_poses - 1, graph.num_poses + num_new_poses)
-    chain = np.column_stack([edges_of_chain[:-1], edges_of_chain[1:]])
-    paths = np.stack([_towards_targets(positions, step, num_new_poses, rng) for _ in range(count)])
-    distances, nearest = cast("tuple[FloatArray, IntArray]", old_poses.query(paths))
+    new_poses = n + np.arange(num_new_poses)
+    chain = np.column_stack([np.r_[graph.last_pose, new_poses[:-1]], new_poses])
+    paths = np.stack([_towards_targets(poses.positions, step, num_new_poses, rng) for _ in range(count)])
+    distances, nearest = cast("tuple[FloatArray, IntArray]", KDTree(poses.positions).query(paths))
     closes = np.zeros(distances.size, dtype=bool)
     closes[np.argsort(distances, axis=None, kind="stable")[: count * num_closures]] = True
     closes = closes.reshape(distances.shape)
+    model = learn_observations(graph)
     actions: list[Action] = []
     for index, path in enumerate(paths):
-        new = np.flatnonzero(closes[index])
-        edges = np.concatenate([chain, np.column_stack([n + new, nearest[index, new]])])
-        actions.append(Action(_poses_along(graph, path), edges, matrix, label=f"path {index}", length=num_new_poses * step))
+        stations, new = _poses_along(poses, path), np.flatnonzero(closes[index])
+        edges = np.concatenate([chain, np.column_stack([n + new, graph.pose_indices[nearest[index, new]]])])
+        information = matrix
+        if model is not None:
+            seen = observations_from(graph, stations, model) + np.array([n, 0])
+            of_landmarks = model.information(graph.tangent_dim, graph.group.position_dim)
+            information = np.concatenate([np.tile(matrix, (len(edges), 1, 1)), np.tile(of_landmarks, (len(seen), 1, 1))])
+            edges = np.concatenate([edges, seen])
+        actions.append(Action(stations, edges, information, label=f"path {index}", length=num_new_poses * step))
     return tuple(actions)
 
 

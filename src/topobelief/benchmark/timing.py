@@ -74,9 +74,9 @@ class SessionTimes:
 
     Attributes
     ----------
-    name, num_poses, num_edges
+    name, num_poses, num_landmarks, num_edges
         Of the prior.
-    num_actions, num_new_poses, num_closures
+    num_actions, num_new_poses, num_closures, num_observations
         K, and the means of an action.
     methods
     first_answer
@@ -94,6 +94,8 @@ class SessionTimes:
     methods: tuple[MethodTime, ...]
     first_answer: float
     largest_deviation: float
+    num_landmarks: int = 0
+    num_observations: float = 0.0
 
     @property
     def gtsam(self) -> MethodTime | None:
@@ -153,7 +155,7 @@ def time_session(
     values: list[float] = []
     chosen = actions[: num_actions : max(1, num_actions // repetitions)][:repetitions]
     for method in baselines() if methods is None else methods:
-        if graph.num_poses > method.largest_graph:
+        if not method.takes(graph):
             continue
         progress(method.name)
         try:
@@ -171,10 +173,12 @@ def time_session(
     return SessionTimes(
         name=session.name,
         num_poses=graph.num_poses,
+        num_landmarks=graph.num_landmarks,
         num_edges=graph.num_edges,
         num_actions=num_actions,
         num_new_poses=float(np.mean([action.num_new_poses for action in timed])),
         num_closures=float(np.mean([action.num_closures for action in timed])),
+        num_observations=float(np.mean([action.num_observations for action in timed])),
         methods=tuple(rows),
         first_answer=first_answer,
         largest_deviation=max(values, default=0.0),
@@ -301,8 +305,9 @@ def _deviation(method: Baseline, graph: PoseGraph, actions: Sequence[Action], fo
         return float(np.max(np.abs(errors / np.array(found) - 1)))
     kappa, log_2_pi_e = graph.tangent_dim, np.log(2 * np.pi * np.e)
     entropies = Planner(graph, anchor=anchor_of(graph)).entropies(actions)
-    num_free = np.array([graph.num_poses + action.num_new_poses - 1 for action in actions])
-    ours = num_free * kappa * log_2_pi_e - 2 * entropies
+    new = np.array([action.num_new_poses for action in actions])
+    num_free = kappa * (graph.num_poses + new - 1) + graph.group.position_dim * graph.num_landmarks
+    ours = num_free * log_2_pi_e - 2 * entropies
     return float(np.max(np.abs(ours - np.array(found)) / np.abs(ours)))
 
 

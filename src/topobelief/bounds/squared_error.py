@@ -7,7 +7,8 @@ left when rotations are known and what rotations add, K = I_rr - I_rp I_pp^-1 I_
 
     tr Pi (I_pp^-1 + N I_rr^-1 N^T) Pi  <=  n E^2  <=  tr Pi (I_pp^-1 + N L_r|p^-1 N^T) Pi.
 
-L_r|p and I_rr are those of Fischer's bounds of ln det I. By increments E itself costs less than these bounds, so both are it.
+L_r|p and I_rr are those of Fischer's bounds of ln det I. By increments, and on large graphs with compiled kernels, E itself
+costs less than these bounds, so both are it.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from topobelief.linalg.estimate import Estimate, Number
 
 def fischer(forms: Forms[Number], options: BoundOptions) -> tuple[Estimate[Number], Estimate[Number]]:
     """(lower, upper) bounds of E^2, m^2."""
-    if forms.increments is not None:
+    if forms.has_fast_traces:
         return exact(forms, options)
     known_rotations = forms.aligned_trace("positions")
     lower = known_rotations + forms.coupled_trace("rotations")

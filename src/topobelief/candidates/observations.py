@@ -9,7 +9,8 @@ the pose that sees it (docs, the mathematics, section 5).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -23,6 +24,7 @@ from topobelief.world import FreeSpace
 from topobelief.world.space import seen_by
 
 _REACH = 0.9  # share of the observations whose distance and bearing the rule covers
+_MOST = 0.5  # share of the observations
 _LEAST_HALF_ANGLE = math.radians(15)
 _INCLUDED = 1e-6  # relative; what is at the quantile itself is within the rule
 _AT_ONCE = 2048  # poses whose pairs are held in memory together
@@ -45,6 +47,8 @@ class ObservationModel:
         That such an opportunity is taken.
     sigma
         Standard deviation of an observed position along every direction, metres.
+    line_of_sight
+        Whether a landmark must be in sight where a world is given.
     num_observed
         From how many observations the model was learned; None where it was stated.
 
@@ -64,6 +68,7 @@ class ObservationModel:
     field_of_view: float = 2 * math.pi
     max_per_pose: int | None = 1
     probability: float = 0.5
+    line_of_sight: bool = True
     num_observed: int | None = None
 
     def __post_init__(self) -> None:
@@ -89,20 +94,23 @@ class ObservationModel:
 
     def __str__(self) -> str:
         number = "all" if self.max_per_pose is None else f"at most {self.max_per_pose} a pose"
+        walls = "" if self.line_of_sight else ", in sight or not"
         view = "" if self.field_of_view >= 2 * math.pi else f", {math.degrees(self.field_of_view):.0f}° ahead"
         percent = 100 * self.probability
         share = f"{percent:.0f}" if percent >= 10 else f"{percent:.2g}"
         chance = "" if self.probability == 1 else f", {share} % of opportunities"
         learned = "" if self.num_observed is None else f", learned from {self.num_observed} observations of this graph"
-        return f"landmarks: {number} within {self.max_range:.3g} m{view}{chance}, {self.sigma:.3g} m{learned}"
+        return f"landmarks: {number} within {self.max_range:.3g} m{view}{walls}{chance}, {self.sigma:.3g} m{learned}"
 
 
-def learn_observations(graph: PoseGraph, *, world: FreeSpace | None = None) -> ObservationModel | None:
+def learn_observations(graph: PoseGraph, *, world: FreeSpace | None = None, **stated: Any) -> ObservationModel | None:
     """The observations that a graph's own front end made, as a model of those to come; None where there are none.
 
     `max_range` is the 90 % quantile of the distances from which landmarks were observed, `field_of_view` twice that of their
     angles off the direction ahead, at least 30 degrees. `max_per_pose` is k, the mean number of landmarks of those poses that
-    observe any, rounded up; `probability` is (1 + m) / (2 + n), m of the observations within the rule being made where it would
+    observe any, rounded up; `line_of_sight` is whether most observations were made along a free line of sight: trees beside the
+    region that a trajectory spans, or tags in walls, were seen although the world says that nothing can be seen there.
+    `probability` is (1 + m) / (2 + n), m of the observations within the rule being made where it would
     have predicted n. `sigma` is that of the median of |O_pp|^(1/k).
 
     Parameters
@@ -110,7 +118,10 @@ def learn_observations(graph: PoseGraph, *, world: FreeSpace | None = None) -> O
     graph
         At its estimate.
     world
-        Where given, opportunities are landmarks in sight in it. Learn with the world that you predict with.
+        Where given, opportunities are landmarks in sight in it, if most that were observed are. Learn with the world that
+        you predict with.
+    **stated
+        Attributes of the model that are not to be learned; `probability`, unless it is stated too, is learned for these.
     """
     observing = np.flatnonzero(graph.reading_codes)
     if observing.size == 0:
@@ -124,18 +135,15 @@ def learn_observations(graph: PoseGraph, *, world: FreeSpace | None = None) -> O
         sigma=float(np.median(scalar_weights(graph.information[observing])[0])) ** -0.5,
         field_of_view=min(2 * half, 2 * math.pi),
         max_per_pose=math.ceil(len(edges) / len(np.unique(edges[:, 0]))),
+        line_of_sight=world is None or bool(np.mean(_in_sight(graph, graph.poses[edges[:, 0]], edges[:, 1], world)) >= _MOST),
         num_observed=len(observing),
     )
+    model = replace(model, **stated)
+    if "probability" in stated:
+        return model
     opportunities = len(observations_from(graph, graph.poses[graph.pose_indices], model, world=world))
     taken = min(len(edges), opportunities)
-    return ObservationModel(
-        model.max_range,
-        model.sigma,
-        model.field_of_view,
-        model.max_per_pose,
-        (1 + taken) / (2 + opportunities),
-        model.num_observed,
-    )
+    return replace(model, probability=(1 + taken) / (2 + opportunities))
 
 
 def observations_from(
@@ -149,7 +157,7 @@ def observations_from(
     poses : shape (N, pose_size)
     model
     world
-        Where given, a landmark must be in sight.
+        Where given, a landmark must be in sight, if the model says so.
 
     Returns
     -------
@@ -166,10 +174,8 @@ def observations_from(
         near = KDTree(graph.group.position(part)).sparse_distance_matrix(tree, model.max_range, output_type="ndarray")
         row, landmark, distance = near["i"].astype(np.int64), landmarks[near["j"]], near["v"]
         kept = _in_view(graph, part[row], landmark, model)
-        if world is not None:
-            kept[kept] = world.visible(
-                seen_by(world, graph.group.position(part[row[kept]])), seen_by(world, graph.positions[landmark[kept]])
-            )
+        if world is not None and model.line_of_sight:
+            kept[kept] = _in_sight(graph, part[row[kept]], landmark[kept], world)
         row, landmark, distance = row[kept], landmark[kept], distance[kept]
         order = np.lexsort([landmark, distance, row])
         row, landmark = row[order], landmark[order]
@@ -179,6 +185,10 @@ def observations_from(
         order = np.lexsort([landmark, row])
         found.append(np.stack([row[order] + first, landmark[order]], axis=1))
     return np.concatenate(found)
+
+
+def _in_sight(graph: PoseGraph, poses: FloatArray, landmarks: IntArray, world: FreeSpace) -> BoolArray:
+    return world.visible(seen_by(world, graph.group.position(poses)), seen_by(world, graph.positions[landmarks]))
 
 
 def _in_view(graph: PoseGraph, poses: FloatArray, landmarks: IntArray, model: ObservationModel) -> BoolArray:

@@ -1,4 +1,4 @@
-"""Which loops predicted paths close, as the options of `topobelief plan` say: learned, by the paper's rule, or by hand."""
+"""Which loops predicted paths close and which landmarks they observe, as the options of `topobelief plan` say."""
 
 from __future__ import annotations
 
@@ -12,6 +12,13 @@ from topobelief.cli.plan_options import Closures
 from topobelief.errors import InvalidInputError
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.world import FreeSpace
+
+_OPTIONS = {
+    "max_range": "--observation-range",
+    "field_of_view": "--field-of-view",
+    "max_per_pose": "--observations-per-pose",
+    "probability": "--observation-probability",
+}
 
 
 def stated_closures(
@@ -56,10 +63,20 @@ def told_closures(
 
 
 def told_observations(
-    graph: PoseGraph, world: FreeSpace, reporter: Reporter, *, line_of_sight: bool
+    graph: PoseGraph, world: FreeSpace, reporter: Reporter, *, line_of_sight: bool, **stated: float | None
 ) -> ObservationModel | None:
-    """How landmarks are observed, learned from the graph and told in one line; None where it has none."""
-    model = learn_observations(graph, world=world if line_of_sight else None)
+    """How landmarks are observed, learned from the graph as far as it is not `stated`, and told; None where it has none.
+
+    Raises
+    ------
+    InvalidInputError
+        Where something is stated and the graph has no landmarks.
+    """
+    given = {name: value for name, value in stated.items() if value is not None}
+    model = learn_observations(graph, world=world if line_of_sight else None, **given)
     if model is not None:
         reporter.say(str(model))
+    elif given:
+        options = " and ".join(_OPTIONS[name] for name in given)
+        raise InvalidInputError(f"expected landmarks in the graph with {options}, got none; leave out what is about them")
     return model

@@ -45,6 +45,10 @@ def plan(
     closure_radius: options.ClosureRadius = None,
     closure_angle: options.ClosureAngle = None,
     min_index_gap: options.MinIndexGap = None,
+    observation_range: options.ObservationRange = None,
+    field_of_view: options.FieldOfView = None,
+    observations_per_pose: options.ObservationsPerPose = None,
+    observation_probability: options.ObservationProbability = None,
     line_of_sight: options.LineOfSight = None,
     sigma_p: options.SigmaP = None,
     sigma_theta: options.SigmaTheta = None,
@@ -156,7 +160,16 @@ def plan(
     rule = replace(
         rule,
         closures=model,
-        observations=told_observations(graph, world, reporter, line_of_sight=rule.line_of_sight),
+        observations=told_observations(
+            graph,
+            world,
+            reporter,
+            line_of_sight=rule.line_of_sight,
+            max_range=observation_range,
+            field_of_view=field_of_view,
+            max_per_pose=observations_per_pose,
+            probability=observation_probability,
+        ),
         information=plan_stages.information(sigma_p, sigma_theta, tangent_dim=graph.tangent_dim),
         spacing=spacing or usual_spacing(graph),
     )

@@ -70,6 +70,18 @@ def angle(value: float | None) -> float | None:
     return _radians(value, math.pi)
 
 
+def field_of_view(value: float | None) -> float | None:
+    """Radians, at most 2 pi."""
+    return _radians(value, 2 * math.pi)
+
+
+def probability(value: float | None) -> float | None:
+    """Above 0 and at most 1."""
+    if value is not None and not 0 < value <= 1:
+        raise typer.BadParameter(f"expected a probability above 0 and at most 1, got {value:g}.")
+    return value
+
+
 def heading_noise(value: float | None) -> float | None:
     """Radians, at most those of a heading of which nothing is known."""
     return _radians(value, _UNIFORM_STD)

@@ -45,7 +45,9 @@ def spreads(
     """Of the finalists whose closures are not certain; told in one line."""
     found: list[Spread] = []
     chosen = finalists(decision, shortest)
-    number = num_draws(max(proposals.actions[index].expected_closures for index in chosen))
+    number = num_draws(
+        max(proposals.actions[index].expected_closures + proposals.actions[index].expected_observations for index in chosen)
+    )
     with reporter.stage("draws"):
         for index in chosen:
             action = proposals.actions[index]

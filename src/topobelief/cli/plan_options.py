@@ -248,12 +248,46 @@ MinIndexGap = Annotated[
         rich_help_panel=_FACTORS,
     ),
 ]
+ObservationRange = Annotated[
+    float | None,
+    typer.Option(
+        metavar="M",
+        help="Known landmarks are observed within this distance, metres.",
+        show_default="learned",
+        callback=values.above_zero,
+        rich_help_panel=_FACTORS,
+    ),
+]
+FieldOfView = Annotated[
+    float | None,
+    typer.Option(
+        metavar="RAD",
+        help="… within this whole angle about the direction ahead, radians.",
+        show_default="learned",
+        callback=values.field_of_view,
+        rich_help_panel=_FACTORS,
+    ),
+]
+ObservationsPerPose = Annotated[
+    int | None,
+    typer.Option(min=1, metavar="N", help="… at most so many a pose.", show_default="learned", rich_help_panel=_FACTORS),
+]
+ObservationProbability = Annotated[
+    float | None,
+    typer.Option(
+        metavar="P",
+        help="… each with this probability.",
+        show_default="learned",
+        callback=values.probability,
+        rich_help_panel=_FACTORS,
+    ),
+]
 LineOfSight = Annotated[
     bool | None,
     typer.Option(
         "--line-of-sight/--no-line-of-sight",
         metavar="",
-        help="Close loops only with poses in line of sight.",
+        help="Close loops only with poses, and observe only landmarks, in line of sight.",
         show_default="yes",
         rich_help_panel=_FACTORS,
     ),

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from topobelief.candidates.predicted_factors import default_information
 from topobelief.candidates.propose import CandidateRule
 from topobelief.candidates.roadmap import build_roadmap
 from topobelief.candidates.start import Start
@@ -22,7 +21,7 @@ from topobelief.cli.plan_candidates import Proposals
 from topobelief.cli.plan_ends import Goal, shown
 from topobelief.cli.plan_world import told_of_poses_outside
 from topobelief.errors import NotOptimizedWarning
-from topobelief.graph.action import Action
+from topobelief.graph.action import staying
 from topobelief.planning.decision import Decision
 from topobelief.planning.planner import Planner
 from topobelief.search.anytime import SearchProgress
@@ -121,9 +120,8 @@ def search(
     PlanningError
         Where a goal cannot be reached, or not within the length.
     """
-    graph = planner.graph
-    with reporter.stage("prior"):
-        planner.entropies([Action(np.zeros((0, graph.group.pose_size)), [], default_information(graph))])
+    with reporter.stage("prior"):  # kernels are loaded and the map is factored, so that the time of the search is its own
+        planner.entropies([staying(planner.graph)])
     results: list[SearchResult] = []
     for goal in goals or [None]:
         seconds = None if limits.seconds is None else limits.seconds / max(1, len(goals))

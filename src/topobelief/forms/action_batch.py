@@ -48,8 +48,8 @@ class ActionBatch:
 
     @cached_property
     def num_closures(self) -> IntArray:
-        """Loop closures of each action, shape (K,)."""
-        return np.array([action.num_closures for action in self.actions])
+        """Edges of each action beyond the one that attaches each new pose, observations among them, shape (K,)."""
+        return self.num_edges - self.num_new
 
     @cached_property
     def edge_start(self) -> IntArray:

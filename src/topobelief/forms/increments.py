@@ -152,6 +152,10 @@ class IncrementalForms(Forms[FloatArray], ClosureForms[FloatArray]):
         light = self._light(factor)
         if not light.any():
             return Estimate(np.full(self._batch.count, np.nan), np.full(self._batch.count, np.inf))
+        if not (light & (self._batch.num_closures > 0)).any():  # without closures there is no gain, and no need of solutions
+            found = self._prior.trace(name)
+            value, error = np.where(light, found.value, np.nan), np.full(self._batch.count, found.error)
+            return 1 / self._prior.alignment.count * Estimate(value, error)
         prior, trusted = self._prior.solutions(name), self._trusted(name, 0.0)
         if name not in self._traced:
             self._traced[name] = log_det_increments(

@@ -18,7 +18,7 @@ from topobelief.graph.pose_graph import PoseGraph
 from topobelief.graph.topology import Topology
 from topobelief.linalg import EdgeForm, Estimate, LogDetSolver
 from topobelief.linalg.inverse import InverseSolver, Solutions
-from topobelief.linalg.inverse_traces import inverse_traces
+from topobelief.linalg.inverse_traces import inverse_traces, is_compiled
 from topobelief.linalg.shear import moved_rotations, sheared_log_det
 
 _RATIO_SAFETY = 4.0  # the directions that were looked at may not contain the worst one
@@ -121,7 +121,7 @@ class GraphForms(Forms[float]):
         if name == "positions":
             return self._positions[1].trace
         form, alignment = _blocks(self._rows, name), self._alignment
-        [trace] = inverse_traces(form, self.graph.num_nodes, [(alignment.nodes, alignment.columns(form.block_size))])
+        [trace] = inverse_traces(form, self.graph.num_nodes, [alignment.projection])
         return trace
 
     def coupled_trace(self, rotations: RotationsName) -> Estimate[float]:
@@ -137,6 +137,10 @@ class GraphForms(Forms[float]):
         error = trace.error + 2 * along.relative_error * math.sqrt(max(0.0, ratio * along.trace.value * trace.value))
         return 1 / self._alignment.count * Estimate(trace.value, error)
 
+    @property
+    def has_fast_traces(self) -> bool:
+        return is_compiled(self.graph.num_nodes * self.tangent_dim)
+
     def knows(self, form: FormName) -> bool:
         return (form, 0.0, "all") in self._known
 
@@ -148,7 +152,7 @@ class GraphForms(Forms[float]):
         """Columns Pi on all poses, and what I_pp^-1 makes of them."""
         form = _blocks(self._rows, "positions")
         columns = np.zeros((self.graph.num_nodes, form.block_size, self._alignment.count * self.split[0]))
-        columns[self._alignment.nodes] = self._alignment.columns(form.block_size)
+        columns[self._alignment.nodes] = self._alignment.projection.columns(form.block_size)
         solver = InverseSolver(self.graph.edges, self.graph.num_nodes, form.strongest_node())
         return columns, solver.solve(form, columns)
 

@@ -93,7 +93,7 @@ class TopologyForms(TreeForms[float]):
 
 def mean_resistance(laplacian: EdgeForm, num_nodes: int, sample: IntArray) -> Estimate[float]:
     """1/|S| tr(Pi_n L^-1 Pi_n) over a sample S of the nodes, from scratch."""
-    [trace] = inverse_traces(laplacian, num_nodes, [(sample, centring(len(sample))[:, None])])
+    [trace] = inverse_traces(laplacian, num_nodes, [centring(sample)])
     return 1 / len(sample) * trace
 
 

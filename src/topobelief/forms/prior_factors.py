@@ -21,7 +21,9 @@ from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg import EdgeForm, Estimate, LogDetSolver, laplacian_form
 from topobelief.linalg.elimination_paths import FormFactor, KnownColumns, changed_nodes
 from topobelief.linalg.elimination_tree import EliminationTree
-from topobelief.linalg.inverse import Solutions
+from topobelief.linalg.inverse import Projection, Solutions
+from topobelief.linalg.inverse_traces import COMPILED_SIZE
+from topobelief.linalg.selected_inverse import projected_trace
 from topobelief.linalg.solutions import solutions
 
 SolvedName = Literal["trees_p"] | PositionsName
@@ -55,6 +57,7 @@ class PriorFactors:
     ) -> None:
         self.graph, self.anchor, self.sample_size = graph, anchor, sample_size
         self._solutions: dict[FormName, Solutions] = {}
+        self._traces: dict[FormName, Estimate[float]] = {}
         self._trees: dict[int, EliminationTree] = {}
         self._bases: dict[int, EliminationTree] = {}  # of the trees that keep an order
         self._factors: dict[tuple[FormName, float], FormFactor] = {}
@@ -64,7 +67,7 @@ class PriorFactors:
     def _without_earlier(self) -> PriorFactors:
         """The same without those that they came from, so that a graph that grows again and again does not keep them all."""
         alone = copy(self)
-        alone._earlier, alone._solutions = None, {}
+        alone._earlier, alone._solutions, alone._traces = None, {}, {}
         return alone
 
     @property
@@ -139,13 +142,22 @@ class PriorFactors:
     def solutions(self, name: SolvedName) -> Solutions:
         """M^-1 C of the columns of a projection of positions: Pi, or Pi_n for trees, and tr(C^T M^-1 C)."""
         if name not in self._solutions:
-            sample = self.alignment.nodes
-            if name == "trees_p":
-                columns = centring(len(sample))[:, None]
-            else:
-                columns = self.alignment.columns(form_of(name, self).block_size)
-            self._solutions[name] = solutions(self.factor(name, 0.0), sample, columns)
+            factor, projection = self.factor(name, 0.0), self.projection(name)
+            self._solutions[name] = solutions(factor, projection.nodes, projection.columns(factor.block_size))
         return self._solutions[name]
+
+    def trace(self, name: SolvedName) -> Estimate[float]:
+        """tr(C^T M^-1 C) of the same columns; of large graphs without the solutions, while nobody has asked for these."""
+        factor = self.factor(name, 0.0)
+        if name in self._solutions or factor.tree.num_free * factor.block_size <= COMPILED_SIZE:
+            return self.solutions(name).trace
+        if name not in self._traces:
+            self._traces[name] = projected_trace(factor, self.projection(name))
+        return self._traces[name]
+
+    def projection(self, name: SolvedName) -> Projection:
+        """What traces are taken with."""
+        return centring(self.alignment.nodes) if name == "trees_p" else self.alignment.projection
 
     @cached_property
     def alignment(self) -> Alignment:

@@ -193,6 +193,11 @@ class Forms(TreeForms[Number]):
         return False
 
     @property
+    def has_fast_traces(self) -> bool:
+        """Whether the joint form's trace costs less than the traces by which it can be bounded."""
+        return self.increments is not None
+
+    @property
     @abstractmethod
     def increments(self) -> ClosureForms[Number] | None:
         """What closures add, where the prior is known apart from the action; None from scratch."""

@@ -121,18 +121,29 @@ class Action(ReadOnlyArrays):
 
     @property
     def num_closures(self) -> int:
-        """Edges beyond the one that attaches each new pose to the graph."""
-        return len(self.edges) - self.num_new_poses
+        """Edges between poses beyond the one that attaches each new pose to the graph."""
+        return len(self.edges) - self.num_new_poses - self.num_observations
 
     @property
-    def observes(self) -> bool:
-        """Whether an edge says nothing of rotations, as observations of landmarks do."""
-        return not bool(measures_rotations(self.information).all())
+    def num_observations(self) -> int:
+        """Edges that say nothing of rotations, as observations of landmarks do."""
+        return int(np.count_nonzero(self._observing))
 
     @property
     def expected_closures(self) -> float:
         """`num_closures`, each as often as it is probable."""
-        return self.num_closures if self.probabilities is None else float(self.probabilities.sum()) - self.num_new_poses
+        if self.probabilities is None:
+            return self.num_closures
+        return float(self.probabilities[~self._observing].sum()) - self.num_new_poses
+
+    @property
+    def expected_observations(self) -> float:
+        """`num_observations`, each as often as it is probable."""
+        return self.num_observations if self.probabilities is None else float(self.probabilities[self._observing].sum())
+
+    @property
+    def _observing(self) -> BoolArray:
+        return ~measures_rotations(self.information)
 
 
 def _checked_probabilities(probabilities: ArrayLike, num_edges: int) -> FloatArray:
@@ -231,7 +242,7 @@ def _all_fit(graph: PoseGraph, actions: Sequence[Action]) -> bool:
     edges = np.concatenate([action.edges for action in actions])
     if (edges >= graph.num_nodes + num_new[which, None]).any() or (edges[:, 0] == edges[:, 1]).any():
         return False
-    if graph.num_landmarks or any(action.observes for action in actions):
+    if graph.num_landmarks or any(action.num_observations for action in actions):
         return False  # told apart one by one
     first = np.cumsum(num_new) - num_new  # all new poses in a row, behind the prior as one node, 0
     contracted = np.where(edges < graph.num_nodes, 0, edges - graph.num_nodes + 1 + first[which, None])
@@ -302,6 +313,11 @@ def posterior(graph: PoseGraph, action: Action) -> PoseGraph:
         of_positions(action.information, observing),
         _new_ids(graph.ids, action.num_new_poses),
     )
+
+
+def staying(graph: PoseGraph) -> Action:
+    """The action that adds nothing."""
+    return Action(graph.poses[:0], np.zeros((0, 2), dtype=np.int64), np.eye(graph.tangent_dim))
 
 
 def landmark_ends(graph: PoseGraph, edges: IntArray) -> BoolArray:

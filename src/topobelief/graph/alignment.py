@@ -7,12 +7,14 @@ span the columns of an orthonormal U, and Pi = I - U U^T takes them out, as the 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from topobelief.arrays import FloatArray, IntArray
 from topobelief.errors import InvalidInputError
+from topobelief.linalg.inverse import Projection
 
 DEFAULT_SAMPLE_SIZE = 500
 """Poses of the map at most over which its error is taken."""
@@ -38,9 +40,9 @@ def checked_sample_size(size: int) -> int:
     return size
 
 
-def centring(count: int) -> FloatArray:
-    """I - 1 1^T / n, shape (n, n): takes the mean out."""
-    return np.eye(count) - 1 / count
+def centring(nodes: IntArray) -> Projection:
+    """Takes the mean out of a number on each node."""
+    return Projection(nodes, np.full((len(nodes), 1, 1), 1 / math.sqrt(len(nodes))))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -77,14 +79,12 @@ class Alignment:
         """s, poses of the sample."""
         return len(self.nodes)
 
-    def columns(self, block_size: int) -> FloatArray:
-        """Pi, shape (s, block_size, s k): on the positions, which are the first k of `block_size` variables a pose."""
-        count, k, num_turns = self.turns.shape
-        turns = self.turns.reshape(count * k, num_turns)
-        projection = np.kron(centring(count), np.eye(k)) - turns @ turns.T
-        columns = np.zeros((count, block_size, count * k))
-        columns[:, :k] = projection.reshape(count, k, count * k)
-        return columns
+    @property
+    def projection(self) -> Projection:
+        """Pi, on the positions."""
+        count, k, _ = self.turns.shape
+        moves = np.broadcast_to(np.eye(k), (count, k, k)) / math.sqrt(count)
+        return Projection(self.nodes, np.concatenate([moves, self.turns], axis=2))
 
 
 def _turned(positions: FloatArray) -> FloatArray:

@@ -2,7 +2,8 @@
 
     VERTEX_XY id x y
     EDGE_SE2_XY i l x y I11 I12 I22                 position in the frame of pose i, and its information
-    LANDMARK2 i l x y I11 I12 I22                   the same
+    EDGE_BEARING_SE2_XY i l bearing I               angle off the direction ahead, and its information
+    LANDMARK2 i l x y I11 I12 I22                   as EDGE_SE2_XY
     LANDMARK i l x y C11 C12 C22                    position with its covariance
     BR i l bearing range sigma_bearing sigma_range
     VERTEX_TRACKXYZ id x y z
@@ -29,7 +30,7 @@ from topobelief.errors import FileError, InvalidInputError
 from topobelief.geometry import SE2_GROUP, SE3_GROUP, Group
 from topobelief.graph.information import positive_definite
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.graph.readings import BEARING_RANGE, POSITION
+from topobelief.graph.readings import BEARING, BEARING_RANGE, POSITION
 from topobelief.io.files import StrPath
 from topobelief.io.line_fields import parsed_fields
 from topobelief.symbols import node_name
@@ -49,9 +50,11 @@ class _Tag:
     meaning: str
 
 
+_BEARING = "EDGE_BEARING_SE2_XY"
 _TAGS = {
     "VERTEX_XY": _Tag(SE2_GROUP, 1, 2, "an id and 2 numbers"),
     "EDGE_SE2_XY": _Tag(SE2_GROUP, 2, 5, "2 ids, 2 numbers and 3 information entries"),
+    _BEARING: _Tag(SE2_GROUP, 2, 2, "2 ids, a bearing and its information"),
     "LANDMARK2": _Tag(SE2_GROUP, 2, 5, "2 ids, 2 numbers and 3 information entries"),
     "LANDMARK": _Tag(SE2_GROUP, 2, 5, "2 ids, 2 numbers and 3 covariances"),
     "BR": _Tag(SE2_GROUP, 2, 4, "2 ids, bearing, range and their standard deviations"),
@@ -166,10 +169,20 @@ class LandmarkLines:
             if not positive_definite(block[None])[0]:
                 what = "covariance" if tag in _COVARIANCES else "information matrix"
                 raise FileError(self.path, f"expected a positive definite {what} for {tag}, got another", line=number)
-            information[row, :k, :k] = block
+            information[row, : len(block), : len(block)] = block
             readings.append(reading)
+        self._require_places()
         pairs = np.array([ids[:2] for _, _, ids, _ in self._seen], dtype=np.int64).reshape(-1, 2)
         return Observations(pairs[:, 0], pairs[:, 1], measurements, information, readings)
+
+    def _require_places(self) -> None:
+        """Refuse landmarks without a line of their own where the first observation is a bearing, which puts them nowhere."""
+        placed = set(self.vertices)
+        for number, tag, ids, _ in self._seen:
+            if tag == _BEARING and ids[1] not in placed:
+                message = f"expected a line VERTEX_XY for landmark {node_name(ids[1])}, which is seen by its bearing first"
+                raise FileError(self.path, f"{message}, got none; say about where it is", line=number)
+            placed.add(ids[1])
 
     def _read(self, tag: str, ids: list[int], numbers: list[float], number: int) -> tuple[FloatArray, FloatArray, str]:
         """Position in the frame of the pose, information, and what is read."""
@@ -179,6 +192,8 @@ class LandmarkLines:
                 raise FileError(self.path, "expected a range and standard deviations above 0 for BR, got others", line=number)
             position = distance * np.array([math.cos(bearing), math.sin(bearing)])
             return position, np.diag(np.array(deviations) ** -2.0), BEARING_RANGE.name
+        if tag == _BEARING:
+            return np.array([math.cos(numbers[0]), math.sin(numbers[0])]), np.array([[numbers[1]]]), BEARING.name
         if tag == "EDGE_SE3_TRACKXYZ":
             return self._from_sensor(ids[2], numbers, number)
         position, matrix = np.array(numbers[:2]), _symmetric(numbers[2:])
@@ -239,7 +254,7 @@ def vertex_lines(graph: PoseGraph) -> list[str]:
 
 
 def observation_lines(graph: PoseGraph) -> list[str]:
-    """Lines of observations of positions, in the order of the graph.
+    """Lines of observations of positions, and in the plane of bearings, in the order of the graph.
 
     Raises
     ------
@@ -247,20 +262,24 @@ def observation_lines(graph: PoseGraph) -> list[str]:
         Where something else is read.
     """
     observing, k = np.flatnonzero(graph.reading_codes), graph.group.position_dim
-    others = sorted(set(graph.readings[observing].tolist()) - {POSITION.name})
+    in_plane = graph.group is SE2_GROUP
+    written = {POSITION.name, BEARING.name} if in_plane else {POSITION.name}
+    readings = graph.readings
+    others = sorted(set(readings[observing].tolist()) - written)
     if others:
         raise InvalidInputError(
-            f"expected observations of positions for a file, got {' and '.join(others).replace('_', ' and ')}; "
+            f"expected observations of {' or '.join(sorted(written))} for a file, got "
+            f"{' and '.join(others).replace('_', ' and ')}; "
             "take them for positions at the estimate with PoseGraph.with_positions()"
         )
-    tag, sensor = ("EDGE_SE2_XY", "") if graph.group is SE2_GROUP else ("EDGE_SE3_TRACKXYZ", " 0")
+    tag, sensor = ("EDGE_SE2_XY", "") if in_plane else ("EDGE_SE3_TRACKXYZ", " 0")
     rows, columns = np.triu_indices(k)
-    return [
-        f"{tag} {i} {j}{sensor} {' '.join(map(repr, [*measured, *entries]))}"
-        for (i, j), measured, entries in zip(
-            graph.ids[graph.edges[observing]].tolist(),
-            graph.measurements[observing, :k].tolist(),
-            graph.information[observing][:, rows, columns].tolist(),
-            strict=True,
-        )
-    ]
+    lines = list[str]()
+    for edge in observing.tolist():
+        (i, j), measured, noise = graph.ids[graph.edges[edge]].tolist(), graph.measurements[edge, :k], graph.noise[edge]
+        if readings[edge] == BEARING.name:
+            lines.append(f"{_BEARING} {i} {j} {math.atan2(measured[1], measured[0])!r} {float(noise[0, 0])!r}")
+        else:
+            numbers = [*measured.tolist(), *noise[rows, columns].tolist()]
+            lines.append(f"{tag} {i} {j}{sensor} {' '.join(map(repr, numbers))}")
+    return lines

@@ -33,6 +33,7 @@ from topobelief.graph.topology import Topology
 from topobelief.io.files import EXPANSION, StrPath
 from topobelief.io.part import wanted_part
 from topobelief.io.reading import ReadGraph, ReadingOptions, by_option
+from topobelief.io.rtabmap_landmarks import with_landmarks
 from topobelief.io.transforms import poses_of_matrices
 from topobelief.wording import counted
 
@@ -43,6 +44,7 @@ _FOREIGN = {  # types of links that are not between two poses: the word that dro
     8: ("landmarks", "sighting of a landmark", "sightings of landmarks"),
     9: ("gravity", "direction of gravity", "directions of gravity"),
 }
+_LANDMARK = 8  # its links lead to tags, which have negative ids
 _LAST_TYPE = 6  # of links between poses: odometry, closures of several kinds, and odometry across nodes that were removed
 _STEPS = 100_000  # of SQLite's virtual machine between two looks at how many there were
 _STEPS_PER_BYTE = 20  # more than reading every row takes
@@ -71,12 +73,13 @@ def read_rtabmap(path: StrPath, options: ReadingOptions) -> ReadGraph:
     """Read the pose graph of an RTAB-Map database, in SE(3).
 
     Poses are those of the last optimisation. Nodes that it left out are composed from links, outwards from those; without any,
-    outwards from the first node of each component at its odometry. Nodes without a link are left out.
+    outwards from the first node of each component at its odometry. Nodes without a link are left out. Tags are landmarks.
 
     Raises
     ------
     FileError
-        If the file is no such database or damaged, or holds links that are not between poses and no option says to drop them.
+        If the file is no such database or damaged, or holds links to what is neither a pose nor a landmark and no option drops
+        them.
     """
     try:
         uri = f"file:{quote(str(Path(path).resolve()))}?mode=ro&immutable=1"  # makes no lock and no journal beside it
@@ -108,7 +111,9 @@ class _Database:
     def graph(self) -> ReadGraph:
         """The graph, and what was dropped or assumed."""
         self._require_tables()
-        links = self._without_twins(self._definite(self._links()))
+        every = self._without_twins(self._definite(self._links()))
+        sighting = (every.ends < 0).any(axis=1)
+        links, sightings = every.chosen(~sighting), every.chosen(sighting)
         ids, edges = np.unique(links.ends, return_inverse=True)
         edges = edges.reshape(-1, 2)
         odometry = self._odometry()
@@ -126,6 +131,9 @@ class _Database:
         information = links.information if len(edges) else np.eye(SE3_GROUP.tangent_dim)
         try:
             graph = PoseGraph(poses, edges, links.transforms, information, ids=ids)
+            if len(sightings.ends):
+                graph, notes = with_landmarks(graph, sightings.ends, sightings.transforms, sightings.information, optimised)
+                self.notes += notes
         except InvalidGraphError as error:
             raise FileError(self.path, str(error)) from None
         return wanted_part(self.path, graph, self.options, self.notes)
@@ -152,7 +160,7 @@ class _Database:
         return {str(row[1]) for row in self._database.execute(f"PRAGMA table_info({table})")}
 
     def _links(self) -> _Links:
-        """Links between poses; the others are dropped or refused."""
+        """Links between poses, and to landmarks; the others are dropped or refused."""
         foreign: dict[int, int] = {}
         ends: list[tuple[int, int]] = []
         transforms: list[FloatArray] = []
@@ -160,12 +168,18 @@ class _Database:
         query = "SELECT from_id, to_id, type, transform, information_matrix FROM Link ORDER BY rowid"
         for start, end, kind, transform, matrix in self._database.execute(query):
             name = f"the link {start} - {end}"
-            if kind in _FOREIGN:
+            seen = kind == _LANDMARK and _FOREIGN[_LANDMARK][0] not in self.options.drop
+            if kind in _FOREIGN and not seen:
                 foreign[kind] = foreign.get(kind, 0) + 1
                 continue
-            if kind not in range(_LAST_TYPE + 1):
+            if kind not in range(_LAST_TYPE + 1) and not seen:
                 raise FileError(self.path, f"expected types of links from 0 to 9, got {kind!r} for {name}")
-            if not all(isinstance(node, int) and node > 0 for node in (start, end)) or start == end:
+            if seen:
+                if not all(isinstance(node, int) for node in (start, end)) or not -(2**31) < min(start, end) < 0 < max(
+                    start, end
+                ):
+                    raise FileError(self.path, f"expected a node and a landmark at the ends of {name}, got others")
+            elif not all(isinstance(node, int) and node > 0 for node in (start, end)) or start == end:
                 raise FileError(self.path, f"expected a link between two nodes with ids from 1, got {start!r} - {end!r}")
             ends.append((start, end))
             transforms.append(self._numbers(transform, 12, np.float32, f"the transform of {name}"))
@@ -185,7 +199,9 @@ class _Database:
         if refused:
             advice = by_option(*(_FOREIGN[kind][0] for kind in refused))
             listed = " and ".join(found[kind] for kind in refused)
-            raise FileError(self.path, f"expected links between poses alone, got {listed}; leave them out with {advice}")
+            raise FileError(
+                self.path, f"expected links to poses and landmarks alone, got {listed}; leave them out with {advice}"
+            )
         self.notes += [f"dropped {shown}; what they measure is not counted" for shown in found.values()]
 
     def _numbers(self, blob: object, count: int, kind: type, name: str) -> FloatArray:
@@ -247,7 +263,7 @@ class _Database:
                 raise FileError(self.path, message)
 
     def _optimised(self) -> dict[int, FloatArray]:
-        """Poses of the last optimisation by id; landmarks have negative ids and are left out."""
+        """Poses of the last optimisation by id; landmarks have negative ids."""
         if not {"opt_ids", "opt_poses"} <= self._columns("Admin"):
             return {}
         row = self._database.execute("SELECT opt_ids, opt_poses FROM Admin LIMIT 1").fetchone()
@@ -257,7 +273,7 @@ class _Database:
         numbers = self._array(row[1], np.float32, "opt_poses")
         if len(numbers) != 12 * len(ids):
             raise FileError(self.path, f"expected {12 * len(ids)} numbers in opt_poses for {len(ids)} ids, got {len(numbers)}")
-        real = ids > 0
+        real = ids != 0
         names = [f"the optimised pose of node {node}" for node in ids[real].tolist()]
         poses = self._poses(numbers.reshape(-1, 12)[real].astype(np.float64), names)
         return dict(zip(ids[real].tolist(), poses, strict=True))

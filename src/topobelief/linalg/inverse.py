@@ -45,6 +45,30 @@ def error_worth_a_qr(size: int) -> float:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
+class Projection:
+    """Pi = I - U U^T on the first k variables of some nodes.
+
+    Attributes
+    ----------
+    nodes : shape (t,)
+        Different ones.
+    directions : shape (t, k, u)
+        U, orthonormal.
+    """
+
+    nodes: IntArray
+    directions: FloatArray
+
+    def columns(self, block_size: int) -> FloatArray:
+        """Pi as columns on these nodes, shape (t, block_size, t k)."""
+        count, k, num_directions = self.directions.shape
+        along = self.directions.reshape(count * k, num_directions)
+        columns = np.zeros((count, block_size, count * k))
+        columns[:, :k] = (np.eye(count * k) - along @ along.T).reshape(count, k, count * k)
+        return columns
+
+
+@dataclass(frozen=True, eq=False, slots=True)
 class Solutions:
     """Z = M^-1 A, and what is known of it.
 

@@ -30,11 +30,20 @@ class Candidate:
     length: float  # metres, of the path that the robot drives
     cost: float  # in the unit of the objective
     expected_closures: float = math.nan  # by their probabilities; nan: all are certain
+    num_observations: int = 0  # of landmarks
+    expected_observations: float = math.nan
 
     def closures(self, noun: str = "closure") -> str:
         """How many closures it has, and how many are expected, in words: "6.9 of 87 possible closures"."""
         certain = math.isnan(self.expected_closures)
         return closures_in_words(self.num_closures, float(self.num_closures) if certain else self.expected_closures, noun)
+
+    def observations(self) -> str:
+        """The same of observations of landmarks, to be added: ", 20.4 of 52 possible observations"; nothing without any."""
+        if not self.num_observations:
+            return ""
+        expected = float(self.num_observations) if math.isnan(self.expected_observations) else self.expected_observations
+        return f", {closures_in_words(self.num_observations, expected, 'observation')}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -125,7 +134,7 @@ class Decision(ReadOnlyArrays):
         poses = f"{candidate.num_new_poses} new poses, " if candidate.num_new_poses else ""
         first = self.name(self.best)
         of_total = f" of {total}" if total > 1 else ""
-        facts = f"{candidate.length:.1f} m, {poses}{candidate.closures('loop closure')}"
+        facts = f"{candidate.length:.1f} m, {poses}{candidate.closures('loop closure')}{candidate.observations()}"
         sentences = [f"{first[:1].upper()}{first[1:]}{of_total} ({facts}) {self._claim()}"]
         ruled_out = total - len(self.survivors)
         if self.margin_met is not None:
@@ -194,6 +203,8 @@ class Decision(ReadOnlyArrays):
                     "num_closures": candidate.num_closures,
                     "length": candidate.length,
                     "expected_closures": without_nan(candidate.expected_closures),
+                    "num_observations": candidate.num_observations,
+                    "expected_observations": without_nan(candidate.expected_observations),
                     "cost": candidate.cost,
                     "signature": without_nan(self.signatures[index]),
                     "lower": without_nan(self.lower[index]),
@@ -235,6 +246,8 @@ class Decision(ReadOnlyArrays):
                     a["length"],
                     a["cost"],
                     _from_json(a.get("expected_closures"), unknown=math.nan),
+                    a.get("num_observations", 0),
+                    _from_json(a.get("expected_observations"), unknown=math.nan),
                 )
                 for a in actions
             )

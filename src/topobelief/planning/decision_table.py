@@ -62,10 +62,9 @@ def decision_table(decision: Decision) -> DecisionTable:
     if any(candidate.cost for candidate in decision.candidates):
         values["cost"] = [cell(candidate.cost, unit) for candidate in decision.candidates]
     values["poses"] = [str(candidate.num_new_poses) for candidate in decision.candidates]
-    values["closures"] = [
-        str(candidate.num_closures) if math.isnan(candidate.expected_closures) else f"{candidate.expected_closures:.1f}"
-        for candidate in decision.candidates
-    ]
+    values["closures"] = [_number(each.num_closures, each.expected_closures) for each in decision.candidates]
+    if any(candidate.num_observations for candidate in decision.candidates):
+        values["observations"] = [_number(each.num_observations, each.expected_observations) for each in decision.candidates]
     values["metres"] = [f"{candidate.length:.1f}" for candidate in decision.candidates]
     columns = (Column("#"), Column("action", is_text=True), *map(Column, values), Column("best", is_text=True))
     surviving = set(decision.survivors.tolist())
@@ -78,9 +77,14 @@ def decision_table(decision: Decision) -> DecisionTable:
     plus_cost = " plus cost" if "cost" in values else ""
     notes = (
         f"lower, upper: bounds of the {decision.quantity}{plus_cost} in {shown_unit(unit)}; the less, the better.",
+        *(["observations: of landmarks, expected."] if "observations" in values else []),
         "Paths are numbered from 0.",
     )
     return DecisionTable(columns, tuple(rows), notes)
+
+
+def _number(certain: int, expected: float) -> str:
+    return str(certain) if math.isnan(expected) else f"{expected:.1f}"
 
 
 def as_text(table: DecisionTable) -> str:

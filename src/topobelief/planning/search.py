@@ -259,6 +259,8 @@ class Search:
                     length,
                     action.cost,
                     math.nan if action.probabilities is None else action.expected_closures,
+                    action.num_observations,
+                    math.nan if action.probabilities is None else action.expected_observations,
                 )
                 for action, length in zip(self._actions, driven_lengths(self._engine.graph, self._actions), strict=True)
             ),

@@ -22,14 +22,14 @@ def benchmark_tables(result: BenchmarkResult) -> Iterable[Table | str]:
     if result.memory:
         table = _table(
             "Peak memory of a process, GB",
-            "poses",
+            "graph",
             "session alone",
             "ranking with Fischer bounds",
             "exact J of all",
             "exact E of all",
         )
         for row in result.memory:
-            table.add_row(f"{row.num_poses}", *(f"{value:.2f}" for value in (row.session, row.bounds, row.exact, row.error)))
+            table.add_row(row.name, *(f"{value:.2f}" for value in (row.session, row.bounds, row.exact, row.error)))
         yield table
     if result.error_bounds:
         first = result.error_bounds[0]
@@ -98,9 +98,11 @@ def _rules(rows: Sequence[BoundsOfCandidates]) -> str:
 
 def session_table(session: SessionTimes, degree_seconds: float | None) -> Table:
     """One row a method."""
+    landmarks = f"{session.num_landmarks} landmarks, " if session.num_landmarks else ""
+    observations = f" and {session.num_observations:.0f} observations" if session.num_landmarks else ""
     title = (
-        f"{session.name}: {session.num_poses} poses, {session.num_edges} edges; {session.num_actions} actions of "
-        f"{session.num_new_poses:.0f} new poses and {session.num_closures:.0f} closures"
+        f"{session.name}: {session.num_poses} poses, {landmarks}{session.num_edges} edges; {session.num_actions} actions of "
+        f"{session.num_new_poses:.0f} new poses, {session.num_closures:.0f} closures{observations}"
     )
     by_degrees = "" if degree_seconds is None else f" ŝ_VN takes {1e6 * degree_seconds:.1f} µs an action beyond its edges."
     table = _table(

@@ -31,7 +31,7 @@ def front_rows(result: SearchResult, count: int = 5, *, names: Mapping[int, str]
         (
             *(() if names is None else (names.get(place, ""),)),
             f"{way.length:.1f} m",
-            _closures(way),
+            *_sights(result, way),
             said(_objective(way), result.objective),
             *((_bound(result, way),) if len(result.front_bounds) else ()),
             f"{100 * (result.value_now - _objective(way)) / most:.0f} %" if most > 0 else "–",
@@ -42,7 +42,7 @@ def front_rows(result: SearchResult, count: int = 5, *, names: Mapping[int, str]
 
 def front_table(result: SearchResult, count: int = 5, *, names: Mapping[int, str] | None = None) -> Table:
     """Some ways of the front, shortest first; names as for `front_rows`."""
-    columns = ("way", "closures", "after it", *(("none below",) if len(result.front_bounds) else ()), "of the gain")
+    columns = ("way", *_sights(result), "after it", *(("none below",) if len(result.front_bounds) else ()), "of the gain")
     table = _table("what each further metre buys", columns if names is None else ("", *columns))
     for row in front_rows(result, count, names=names):
         table.add_row(*row)
@@ -51,10 +51,10 @@ def front_table(result: SearchResult, count: int = 5, *, names: Mapping[int, str
 
 def ways_table(result: SearchResult) -> Table:
     """The best way and its alternatives."""
-    names = ["way", "closures", "after it"] + (["with its cost"] if result.cost_per_metre else [])
+    names = ["way", *_sights(result), "after it"] + (["with its cost"] if result.cost_per_metre else [])
     table = _table("the best ways found", ("#", *names))
     for rank, way in enumerate((result.best, *result.alternatives), start=1):
-        cells = [f"{way.length:.1f} m", _closures(way), said(_objective(way), result.objective)]
+        cells = [f"{way.length:.1f} m", *_sights(result, way), said(_objective(way), result.objective)]
         cells += [said(way.value, result.objective)] if result.cost_per_metre else []
         table.add_row(str(rank), *cells, style="bold green" if rank == 1 else "")
     return table
@@ -83,9 +83,13 @@ _REASONS = {
 }
 
 
-def _closures(way: Way) -> str:
-    """How many loops are expected to be closed."""
-    return f"{way.action.expected_closures:.3g}"
+def _sights(result: SearchResult, way: Way | None = None) -> tuple[str, ...]:
+    """Loops that are expected to be closed and, where any way sees landmarks, observations; names of columns without a way."""
+    ways = (result.best, *result.alternatives, *result.on_front)
+    cells = ("closures", "observations")
+    if way is not None:
+        cells = (f"{way.action.expected_closures:.3g}", f"{way.action.expected_observations:.3g}")
+    return cells if any(each.action.num_observations for each in ways) else cells[:1]
 
 
 def _bound(result: SearchResult, way: Way) -> str:

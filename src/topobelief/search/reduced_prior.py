@@ -24,6 +24,7 @@ from topobelief.graph.alignment import DEFAULT_SAMPLE_SIZE, Alignment
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg.elimination_paths import FormFactor
 from topobelief.linalg.elimination_tree import EliminationTree
+from topobelief.linalg.selected_inverse import inverse_diagonal
 from topobelief.linalg.solutions import solutions
 
 
@@ -109,11 +110,11 @@ class ReducedPrior:
             self.closures[is_landmark] = moves.transpose(0, 2, 1) @ observed[:k, :k] @ moves
         rank: IntArray = np.cumsum(~graph.is_landmark, dtype=np.int64)  # steps of odometry are counted over poses
         self.earliest = np.where(is_landmark, 1, earliest_numbers(rank[seen], int(rank[pose]), min_index_gap))
-        self.variances = self._twists @ _variances(factor, seen) @ self._twists.transpose(0, 2, 1)
+        self.variances = self._twists @ inverse_diagonal(factor, seen) @ self._twists.transpose(0, 2, 1)
         self.mean_square, self._effects = np.nan, np.zeros((len(seen) * kappa, 0))
         if with_errors:
             alignment = Alignment.of(graph.positions, DEFAULT_SAMPLE_SIZE)
-            solved = solutions(factor, alignment.nodes, alignment.columns(kappa))
+            solved = solutions(factor, alignment.nodes, alignment.projection.columns(kappa))
             self.mean_square = float(solved.trace.value) / len(alignment.nodes)
             effects = self._twists @ solved.values[seen] / math.sqrt(len(alignment.nodes))
             self._effects = effects.reshape(len(seen) * kappa, -1)
@@ -150,18 +151,6 @@ class ReducedPrior:
 def in_blocks(poses: IntArray, kappa: int) -> IntArray:
     """Indices of the kappa variables of each of some poses."""
     return (poses[:, None] * kappa + np.arange(kappa)).ravel()
-
-
-def _variances(factor: FormFactor, nodes: IntArray) -> FloatArray:
-    """Diagonal blocks of the inverse at some nodes, shape (w, b, b); the held node's is 0."""
-    at = factor.tree.position[nodes]
-    places: IntArray = np.sort(at[at >= 0])
-    paths = factor.paths(places)
-    result = np.zeros((len(nodes), factor.block_size, factor.block_size))
-    for node in np.flatnonzero(at >= 0).tolist():
-        place = int(np.searchsorted(places, int(at[node])))
-        result[node] = paths.inverse_block(place, place)
-    return result
 
 
 def earliest_numbers(seen: IntArray, pose: int, min_index_gap: int) -> IntArray:

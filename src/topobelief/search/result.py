@@ -10,6 +10,7 @@ import numpy as np
 from topobelief.arrays import FloatArray, ReadOnlyArrays, frozen_floats
 from topobelief.graph.action import Action
 from topobelief.search.front import spread_on_front
+from topobelief.wording import counted
 
 _UNITS = {"error": "m", "per_pose": "nats per pose"}  # else nats
 
@@ -174,6 +175,8 @@ class SearchResult(ReadOnlyArrays):
         after = said(self.best.value - self.best.action.cost, self.objective)
         now = said(self.value_now, self.objective)
         found = f"The best way found is {self.length:.1f} m long and closes {closures} {noun}"
+        if seen := self.action.num_observations:
+            found += f" and observes landmarks {counted(seen, 'time')}"
         return f"{found}: {self._name} {after}, now {now}."
 
     @property

@@ -27,7 +27,7 @@ from topobelief.candidates.predicted_factors import closure_information, default
 from topobelief.candidates.roadmap_graph import Roadmap, with_way
 from topobelief.candidates.start import Start, find_start
 from topobelief.errors import InvalidInputError, PlanningError, require_choice
-from topobelief.graph.action import Action
+from topobelief.graph.action import Action, staying
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.planner import Planner
 from topobelief.planning.registry import default_signature
@@ -232,8 +232,7 @@ def search_roadmap(
         return BothBounds(flows, windows), FrontBounds(flows, shortest, walks.max_length)
 
     stays = walks.in_reach.sum() == 1  # there is one walk, to stay
-    stay = Action(np.zeros((0, graph.poses.shape[1])), np.zeros((0, 2), np.int64), of_odometry)
-    value_now = float(measure([stay])[0])
+    value_now = float(measure([staying(graph)])[0])
 
     def told(progress: SearchProgress) -> None:
         if on_progress is not None:

@@ -137,7 +137,7 @@ class TopologicalPrior:
             log_det += factor.log_det.value + (graph.num_poses - 1) * math.log(scale)
             sigma[:, index, :, index] = inverse[np.ix_(of_seen, of_seen)]
             if with_errors:
-                centre = centring(len(sample))
+                centre = centring(sample).columns(1)[:, 0]
                 mean_square = k * float(np.trace(centre @ inverse[np.ix_(of_sample, of_sample)] @ centre.T)) / len(sample)
                 mixed = inverse[np.ix_(of_seen, of_sample)] @ centre.T
                 kernel = k * (mixed @ mixed.T) / len(sample)

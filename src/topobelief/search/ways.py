@@ -160,7 +160,7 @@ def find_landmarks(graph: PoseGraph, ways: Ways, delta: float, model: Observatio
         upper = np.minimum(upper, limit + _LOOSE * (1 + np.abs(limit)))
     kept = np.flatnonzero((aside <= model.max_range**2) & (lower <= upper))
     lower, upper = lower[kept], upper[kept]
-    if world is not None:
+    if world is not None and model.line_of_sight:
         places = (graph.positions[seen[kept]], ways.begin[way[kept]], ways.end[way[kept]])
         parts = seen_parts(world, *(seen_by(world, each) for each in places))
         kept = kept[parts.which]
