@@ -12,7 +12,7 @@ from typing import get_args
 import pytest
 
 from topobelief.bounds.entropy_bounds import Determinant
-from topobelief.cli import app, main, plan_candidates, plan_options, reading
+from topobelief.cli import app, main, plan_candidates, plan_options, reading, world_options
 from topobelief.io import reading as io_reading
 from topobelief.io import ros_map
 from topobelief.planning import planner
@@ -46,7 +46,7 @@ def test_help_is_whole_in_a_terminal_of_80_columns(topobelief, monkeypatch, comm
     assert not re.search(r"[\w-]…", shown)
     words = set(re.split(r"[\s,;:.]+", shown))
     if command == "plan":
-        kinds = (plan_options.Determinant, plan_options.Proof, plan_options.Unknown)
+        kinds = (plan_options.Determinant, plan_options.Proof, world_options.Unknown)
         assert {"--no-line-of-sight", "--allow-dense-spectrum", "--max-evaluations"} <= words
         assert {choice for kind in kinds for choice in get_args(kind)} <= words
         assert {*OBJECTIVES, *SIGNATURES, *BOUNDS, AUTO} <= words
@@ -88,7 +88,7 @@ def test_the_entry_point_exits_with_the_code(capsys):
     [
         (plan_options.Determinant, get_args(Determinant)),
         (plan_options.Proof, get_args(planner.Proof)),
-        (plan_options.Unknown, get_args(ros_map.Unknown)),
+        (world_options.Unknown, get_args(ros_map.Unknown)),
         (reading.Edge2Order, get_args(io_reading.Edge2Order)),
     ],
 )

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from topobelief.cli import plan_arguments as values
-from topobelief.cli import plan_options as options
+from topobelief.cli import world_options
 from topobelief.cli.plan_arguments import GivenPlace
 from topobelief.cli.reading import Component, Drop, Edge2OrderOption, Planar, RobustAsPlain, Topic, reading_options
 
@@ -54,7 +54,7 @@ Picture = Annotated[
 
 
 def info(
-    graph_file: options.GraphFile,
+    graph_file: world_options.GraphFile,
     optimize: Annotated[
         bool,
         typer.Option("--optimize/--no-optimize", help="Evaluate it at its maximum-likelihood poses, or at those in the file."),

@@ -10,7 +10,7 @@ from typing import cast
 
 import typer
 
-from topobelief.cli import plan_mode
+from topobelief.cli import plan_mode, world_options
 from topobelief.cli import plan_options as options
 from topobelief.cli.reading import Component, Drop, Edge2OrderOption, Planar, RobustAsPlain, Topic, reading_options
 from topobelief.errors import NotOptimizedWarning
@@ -18,19 +18,19 @@ from topobelief.errors import NotOptimizedWarning
 
 def plan(
     context: typer.Context,
-    graph_file: options.GraphFile,
-    goal: options.Goals = None,
-    start: options.Start = None,
-    map_file: options.MapFile = None,
-    map_topic: options.MapTopic = None,
-    along_trajectory: options.AlongTrajectory = False,
-    width: options.Width = None,
-    unknown: options.UnknownCells = "occupied",
-    flying: options.Flying = None,
-    height: options.Height = None,
-    resolution: options.Resolution = None,
-    origin: options.Origin = None,
-    robot_radius: options.RobotRadius = 0.35,
+    graph_file: world_options.GraphFile,
+    goal: world_options.Goals = None,
+    start: world_options.Start = None,
+    map_file: world_options.MapFile = None,
+    map_topic: world_options.MapTopic = None,
+    along_trajectory: world_options.AlongTrajectory = False,
+    width: world_options.Width = None,
+    unknown: world_options.UnknownCells = "occupied",
+    flying: world_options.Flying = None,
+    height: world_options.Height = None,
+    resolution: world_options.Resolution = None,
+    origin: world_options.Origin = None,
+    robot_radius: world_options.RobotRadius = 0.35,
     path: options.PathFiles = None,
     candidates: options.NumCandidates = None,
     max_detour: options.MaxDetour = None,
@@ -64,7 +64,7 @@ def plan(
     determinant: options.DeterminantName = "cholesky",
     proof: options.ProofName = None,
     max_evaluations: options.MaxEvaluations = None,
-    optimize: options.Optimize = True,
+    optimize: world_options.Optimize = True,
     exact: options.Exact = True,
     why: options.Why = None,
     out: options.Out = None,

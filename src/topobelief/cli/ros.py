@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from topobelief.cli import plan_options as options
+from topobelief.cli import world_options
 from topobelief.cli.extras import require_extras
 
 NoiseP = Annotated[
@@ -33,9 +34,9 @@ Seconds = Annotated[
 def ros(
     context: typer.Context,
     graph_file: GraphOption = None,
-    map_file: options.MapFile = None,
-    unknown: options.UnknownCells = "occupied",
-    robot_radius: options.RobotRadius = 0.35,
+    map_file: world_options.MapFile = None,
+    unknown: world_options.UnknownCells = "occupied",
+    robot_radius: world_options.RobotRadius = 0.35,
     vertices: options.Vertices = 1000,
     seed: options.Seed = 0,
     spacing: options.Spacing = None,

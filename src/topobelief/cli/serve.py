@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from topobelief.cli import plan_options as options
+from topobelief.cli import world_options
 from topobelief.cli.extras import require_extras
 from topobelief.cli.reading import Component, Drop, Edge2OrderOption, Planar, RobustAsPlain, Topic, reading_options
 
@@ -32,20 +33,20 @@ Port = Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 for any free 
 
 
 def serve(
-    graph_file: options.GraphFile,
-    start: options.Start = None,
-    map_file: options.MapFile = None,
-    map_topic: options.MapTopic = None,
-    along_trajectory: options.AlongTrajectory = False,
-    width: options.Width = None,
-    unknown: options.UnknownCells = "occupied",
-    robot_radius: options.RobotRadius = 0.35,
+    graph_file: world_options.GraphFile,
+    start: world_options.Start = None,
+    map_file: world_options.MapFile = None,
+    map_topic: world_options.MapTopic = None,
+    along_trajectory: world_options.AlongTrajectory = False,
+    width: world_options.Width = None,
+    unknown: world_options.UnknownCells = "occupied",
+    robot_radius: world_options.RobotRadius = 0.35,
     vertices: options.Vertices = 1000,
     seed: options.Seed = 0,
     spacing: options.Spacing = None,
     max_detour: MaxDetour = 1.3,
     seconds: Seconds = 5.0,
-    optimize: options.Optimize = True,
+    optimize: world_options.Optimize = True,
     host: Host = "127.0.0.1",
     port: Port = 8177,
     drop: Drop = None,
