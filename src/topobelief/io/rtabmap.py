@@ -78,7 +78,8 @@ def read_rtabmap(path: StrPath, options: ReadingOptions) -> ReadGraph:
     Raises
     ------
     FileError
-        If the file is no such database or damaged, or holds links to neither poses nor landmarks and no option says to drop them.
+        If the file is no such database or damaged, or holds links to neither poses nor landmarks and no option
+        drops them.
     """
     try:
         uri = f"file:{quote(str(Path(path).resolve()))}?mode=ro&immutable=1"  # makes no lock and no journal beside it
@@ -111,7 +112,7 @@ class _Database:
         """The graph, and what was dropped or assumed."""
         self._require_tables()
         every = self._without_twins(self._definite(self._links()))
-        sighting = (every.ends < 0).any(axis=1)
+        sighting: BoolArray = np.min(every.ends, axis=1, initial=0) < 0
         links, sightings = every.chosen(~sighting), every.chosen(sighting)
         ids, edges = np.unique(links.ends, return_inverse=True)
         edges = edges.reshape(-1, 2)
