@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -35,13 +36,13 @@ def test_observations_are_learned_and_counted_apart_from_closures(topobelief, st
     assert shown.code == 0
     assert "landmarks: at most" in shown.out
     assert "in sight or not" in shown.out
-    assert "observations" in shown.out
+    assert re.search(r"closures +observations +metres", shown.out)
     document = json.loads(topobelief(plan(street, "--candidates", 2, "--json")).out)
     first = document["actions"][0]
     assert first["num_observations"] > 0
     assert 0 < first["expected_observations"] <= first["num_observations"]
     assert first["expected_closures"] <= first["num_closures"] <= 2 * first["num_new_poses"]
-    assert "observations" in topobelief(plan(street, "--max-evaluations", 20)).out
+    assert re.search(r"way +closures +observations +after it", topobelief(plan(street, "--max-evaluations", 20)).out)
 
 
 def test_what_options_state_is_not_learned(topobelief, street):
