@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -35,17 +36,17 @@ def test_observations_are_learned_and_counted_apart_from_closures(topobelief, st
     assert shown.code == 0
     assert "landmarks: at most" in shown.out
     assert "in sight or not" in shown.out
-    assert "observations" in shown.out
+    assert re.search(r"closures +observations +metres", shown.out)
     document = json.loads(topobelief(plan(street, "--candidates", 2, "--json")).out)
     first = document["actions"][0]
     assert first["num_observations"] > 0
     assert 0 < first["expected_observations"] <= first["num_observations"]
     assert first["expected_closures"] <= first["num_closures"] <= 2 * first["num_new_poses"]
-    assert "observations" in topobelief(plan(street, "--max-evaluations", 20)).out
+    assert re.search(r"way +closures +observations +after it", topobelief(plan(street, "--max-evaluations", 20)).out)
 
 
 def test_what_options_state_is_not_learned(topobelief, street):
-    rule = ["--observation-range", 4.1, "--field-of-view", 6.28, "--observations-per-pose", 3, "--observation-probability", 0.5]
+    rule = ["--observation-range", 4.1, "--field-of-view", 6.28, "--max-observations", 3, "--detection-rate", 0.5]
     shown = topobelief(plan(street, "--candidates", 1, *rule)).out
     assert "landmarks: at most 3 a pose within 4.1 m, 360° ahead, in sight or not, 50 % of opportunities" in " ".join(
         shown.split()
@@ -59,8 +60,8 @@ def test_what_options_state_is_not_learned(topobelief, street):
     [
         (["--observation-range", 0], "expected a number above 0, got 0"),
         (["--field-of-view", 90], "expected at most 6.28319, got 90; angles are in radians"),
-        (["--observation-probability", 2], "expected a probability above 0 and at most 1, got 2"),
-        (["--observations-per-pose", 0], "Input should be greater than or equal to 1"),
+        (["--detection-rate", 2], "expected a probability above 0 and at most 1, got 2"),
+        (["--max-observations", 0], "Input should be greater than or equal to 1"),
     ],
 )
 def test_numbers_out_of_range_are_refused(topobelief, street, options, message):

@@ -15,8 +15,8 @@ from engines import DenseEngine, judge
 from graphs import NOISES, SE2_GROUP, SE3_GROUP, Noise, random_action, random_pose_graph, sessions
 from references import error_reference
 from topobelief.errors import IllConditionedError, InvalidInputError
-from topobelief.forms import increments
-from topobelief.graph.action import Action, posterior
+from topobelief.forms import increments, prior_factors
+from topobelief.graph.action import Action, posterior, staying
 from topobelief.graph.alignment import sample_of
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.graph.topology import Topology
@@ -278,6 +278,15 @@ def test_after_many_closures_a_large_graph_is_factored_anew(monkeypatch):
     assert evaluated == [many]
     np.testing.assert_allclose(found, expected, rtol=1e-9)
     np.testing.assert_allclose(planner.decide([*actions, many], proof="none").signatures, signatures, rtol=1e-9)
+
+
+def test_a_large_map_as_it_is_needs_no_solutions(monkeypatch):
+    graph, _ = a_session(9)
+    expected = Planner(graph, engine="scratch", **ERROR).entropies([staying(graph)])
+    monkeypatch.setattr(prior_factors, "COMPILED_SIZE", 10)
+    monkeypatch.setattr(prior_factors, "solutions", None)
+    found = Planner(graph, engine="incremental", **ERROR).entropies([staying(graph)])
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
 
 
 def test_what_a_factor_from_scratch_would_not_know_better_is_taken_from_increments(monkeypatch):

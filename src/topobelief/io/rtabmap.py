@@ -30,7 +30,7 @@ from topobelief.graph.dead_reckoning import dead_reckoned_poses
 from topobelief.graph.information import positive_definite
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.graph.topology import Topology
-from topobelief.io.files import EXPANSION, StrPath
+from topobelief.io.files import StrPath
 from topobelief.io.part import wanted_part
 from topobelief.io.reading import ReadGraph, ReadingOptions, by_option
 from topobelief.io.rtabmap_landmarks import with_landmarks
@@ -78,8 +78,8 @@ def read_rtabmap(path: StrPath, options: ReadingOptions) -> ReadGraph:
     Raises
     ------
     FileError
-        If the file is no such database or damaged, or holds links to what is neither a pose nor a landmark and no option drops
-        them.
+        If the file is no such database or damaged, or holds links to neither poses nor landmarks and no option
+        drops them.
     """
     try:
         uri = f"file:{quote(str(Path(path).resolve()))}?mode=ro&immutable=1"  # makes no lock and no journal beside it
@@ -112,7 +112,7 @@ class _Database:
         """The graph, and what was dropped or assumed."""
         self._require_tables()
         every = self._without_twins(self._definite(self._links()))
-        sighting = (every.ends < 0).any(axis=1)
+        sighting: BoolArray = np.min(every.ends, axis=1, initial=0) < 0
         links, sightings = every.chosen(~sighting), every.chosen(sighting)
         ids, edges = np.unique(links.ends, return_inverse=True)
         edges = edges.reshape(-1, 2)
@@ -284,11 +284,7 @@ class _Database:
         rows, columns = np.frombuffer(content[-12:-4], dtype="<i4").tolist() if len(content) > 12 else (0, 0)
         expected = rows * columns * np.dtype(kind).itemsize
         try:
-            raw = (
-                zlib.decompressobj().decompress(content[:-12], max(expected, 1))
-                if 0 < expected <= EXPANSION * self._size
-                else b""
-            )
+            raw = zlib.decompressobj().decompress(content[:-12], max(expected, 1)) if 0 < expected <= 100 * self._size else b""
         except zlib.error:
             raw = b""
         if len(raw) != expected or not raw:
