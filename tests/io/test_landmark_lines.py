@@ -174,10 +174,3 @@ def test_bearings_and_ranges_are_written_as_the_positions_that_they_are_to_first
 def test_numbers_beyond_all_bounds_are_read_or_refused_without_a_word_from_numpy(filed, line):
     with suppress(FileError):
         tb.read_g2o(filed(f"{PLANE}{line}\n"))
-
-
-@pytest.mark.filterwarnings("error")
-def test_covariances_that_have_no_inverse_are_refused(filed):
-    text = "VERTEX2 0 0 0 0\nVERTEX2 1 1 0 0\nEDGE2 0 1 1 0 0 1 0 1e308 1 0 0\n"
-    with pytest.raises(FileError, match="positive definite"):
-        tb.read_pose_graph(filed(text), edge2_order="covariance")

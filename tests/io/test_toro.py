@@ -131,3 +131,22 @@ def test_space_has_no_lines_in_toro(tmp_path: Path):
     with pytest.raises(InvalidInputError, match=r"expected a graph in SE\(2\) for a TORO file, got one in SE\(3\); write g2o"):
         write_toro(graph, tmp_path / "graph.toro")
     assert not (tmp_path / "graph.toro").exists()
+
+
+@pytest.mark.parametrize(
+    ("order", "numbers", "message"),
+    [
+        ("covariance", "1 0 1e308 1 0 0", "expected a positive definite information matrix for EDGE2, got eigenvalues"),
+        (
+            "isam_root",
+            "1 1e308 1 1 0 0",
+            "expected a positive definite information matrix for EDGE2, got one that is not finite",
+        ),
+    ],
+)
+@pytest.mark.filterwarnings("error")
+def test_information_beyond_all_bounds_is_refused(tmp_path, order, numbers, message):
+    path = tmp_path / "graph.toro"
+    path.write_text(f"VERTEX2 0 0 0 0\nVERTEX2 1 1 0 0\nEDGE2 0 1 1 0 0 {numbers}\n")
+    with pytest.raises(FileError, match=message):
+        read_toro(path, edge2_order=order)

@@ -11,7 +11,7 @@ import numpy as np
 from topobelief.arrays import FloatArray, ReadOnlyArrays, frozen_floats
 from topobelief.errors import FileError
 from topobelief.geometry.planar import headings_of_quaternions
-from topobelief.io.files import StrPath
+from topobelief.io.files import StrPath, read_text
 
 _UNIT_TOLERANCE = 0.01  # on the length of a quaternion, which files may give in few digits
 
@@ -59,21 +59,10 @@ def path_of_quaternions(path: StrPath, rows: Sequence[Sequence[float]], lines: S
         Names the line of a quaternion whose length is not 1.
     """
     numbers = np.array(rows, dtype=np.float64)
-    return FiledPath(np.column_stack([numbers[:, :3], unit_quaternions(path, numbers[:, 3:], lines)]), tuple(lines))
-
-
-def unit_quaternions(path: StrPath, quaternions: FloatArray, lines: Sequence[int]) -> FloatArray:
-    """Quaternions of shape (N, 4), normalised.
-
-    Raises
-    ------
-    FileError
-        Names the line of a quaternion whose length is not 1.
-    """
-    unit, bad, problem = normalised(quaternions)
+    unit, bad, problem = normalised(numbers[:, 3:])
     if bad is not None:
         raise FileError(path, problem, line=lines[bad])
-    return unit
+    return FiledPath(np.column_stack([numbers[:, :3], unit]), tuple(lines))
 
 
 def normalised(quaternions: FloatArray) -> tuple[FloatArray, int | None, str]:
@@ -95,6 +84,20 @@ def numbered_lines(text: str) -> Iterator[tuple[int, str]]:
         stripped = line.strip()
         if stripped and not stripped.startswith("#"):
             yield number, stripped
+
+
+def numbered_rows(path: StrPath, names: str) -> tuple[list[list[float]], list[int]]:
+    """The numbers of each line of a file, separated by blanks, and the lines; at least one, whose names are separated so too.
+
+    Raises
+    ------
+    FileError
+        Names the line that is not as many finite numbers.
+    """
+    lines = list(numbered_lines(read_text(path)))
+    if not lines:
+        raise FileError(path, f"expected at least one pose {names}, got none")
+    return [finite_numbers(path, number, line.split(), names) for number, line in lines], [number for number, _ in lines]
 
 
 def finite_numbers(path: StrPath, line: int, fields: Sequence[str], names: str) -> list[float]:

@@ -300,12 +300,13 @@ class _Reader:
         wrong = np.flatnonzero(~definite)
         if wrong.size == 0:
             return information, definite
-        spectrum = np.linalg.eigvalsh(information[wrong[0]])
+        first = information[wrong[0]]
+        got = "one that is not finite"
+        if np.isfinite(first).all():
+            spectrum = np.linalg.eigvalsh(first)
+            got = f"eigenvalues from {spectrum[0]:.3g} to {spectrum[-1]:.3g}"
         line = self.edges.lines[int(wrong[0])]
-        message = (
-            f"expected a positive definite information matrix for {self.edges.tag}, "
-            f"got eigenvalues from {spectrum[0]:.3g} to {spectrum[-1]:.3g}"
-        )
+        message = f"expected a positive definite information matrix for {self.edges.tag}, got {got}"
         for other in orders:
             if (
                 other not in self.dialect.roots | self.dialect.inverses

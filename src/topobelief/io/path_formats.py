@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,24 +16,14 @@ from topobelief.io.nav_path import json_of_path, read_nav_path, yaml_of_path
 from topobelief.io.paths_csv import csv_of_path, read_csv_path
 from topobelief.io.tum import read_tum_path, tum_of_path
 
-_READERS: dict[str, Callable[[StrPath], FiledPath]] = {
-    ".csv": read_csv_path,
-    ".tum": read_tum_path,
-    ".txt": read_tum_path,
-    ".yaml": read_nav_path,
-    ".yml": read_nav_path,
-    ".json": read_nav_path,
+_FORMATS: dict[str, tuple[Callable[[StrPath], FiledPath], Callable[[FloatArray], str]]] = {  # what reads, what writes
+    ".csv": (read_csv_path, csv_of_path),
+    ".tum": (read_tum_path, tum_of_path),
+    ".txt": (read_tum_path, tum_of_path),
+    ".yaml": (read_nav_path, yaml_of_path),
+    ".yml": (read_nav_path, yaml_of_path),
+    ".json": (read_nav_path, json_of_path),
 }
-_WRITERS: dict[str, Callable[[FloatArray], str]] = {
-    ".csv": csv_of_path,
-    ".tum": tum_of_path,
-    ".txt": tum_of_path,
-    ".yaml": yaml_of_path,
-    ".yml": yaml_of_path,
-    ".json": json_of_path,
-}
-
-_Found = TypeVar("_Found")
 
 
 def read_path(path: StrPath, *, in_space: bool = False) -> FloatArray:
@@ -65,7 +54,8 @@ def read_path(path: StrPath, *, in_space: bool = False) -> FloatArray:
 
 def read_filed_path(path: StrPath) -> FiledPath:
     """As the file has them, with the line of each pose."""
-    return _by_suffix(path, _READERS)(path)
+    read, _ = _FORMATS[require_path_suffix(path)]
+    return read(path)
 
 
 def write_path(path: StrPath, poses: ArrayLike) -> None:
@@ -90,27 +80,23 @@ def write_path(path: StrPath, poses: ArrayLike) -> None:
 
 def path_text(path: StrPath, poses: ArrayLike) -> str:
     """What `write_path` writes."""
-    writer = _by_suffix(path, _WRITERS)
+    _, write = _FORMATS[require_path_suffix(path)]
     array = frozen_floats(poses, name="poses")
     if array.ndim != 2 or array.shape[1] not in (3, 7) or len(array) == 0 or not np.isfinite(array).all():
         raise InvalidInputError(
             f"expected finite poses x, y, yaw of shape (N, 3), or poses in space of shape (N, 7), got {array.shape}; "
             "`path_poses` adds yaw"
         )
-    return writer(array)
+    return write(array)
 
 
-def require_path_suffix(path: StrPath) -> None:
-    """Raise `FileError` where no format has this suffix."""
-    _by_suffix(path, _WRITERS)
-
-
-def _by_suffix(path: StrPath, formats: Mapping[str, _Found]) -> _Found:
+def require_path_suffix(path: StrPath) -> str:
+    """The suffix of a file, or `FileError` where no format has it."""
     suffix = Path(path).suffix.lower()
-    if suffix not in formats:
+    if suffix not in _FORMATS:
         raise FileError(
             path,
             "expected a path that ends in .csv, .tum, .txt (TUM), .yaml, .yml or .json (nav_msgs/Path), "
             f"got {suffix or 'no suffix'}",
         )
-    return formats[suffix]
+    return suffix

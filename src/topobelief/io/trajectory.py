@@ -21,12 +21,12 @@ from topobelief.errors import FileError
 from topobelief.geometry import SE3_GROUP
 from topobelief.graph.information import block_isotropic
 from topobelief.graph.pose_graph import PoseGraph
-from topobelief.io.filed_path import finite_numbers, numbered_lines, unit_quaternions
+from topobelief.io.filed_path import numbered_lines, numbered_rows
 from topobelief.io.files import StrPath, read_text
 from topobelief.io.part import wanted_part
 from topobelief.io.reading import ReadGraph, ReadingOptions
 from topobelief.io.transforms import FARTHEST, poses_of_matrices
-from topobelief.io.tum import tum_rows
+from topobelief.io.tum import read_tum_path
 from topobelief.wording import counted
 
 _KITTI = "r11 r12 r13 x r21 r22 r23 y r31 r32 r33 z"
@@ -106,21 +106,17 @@ def _poses(path: StrPath) -> tuple[FloatArray, list[str]]:
     """Poses of shape (N, 7), and what was assumed about them."""
     _, first = next(numbered_lines(read_text(path)))
     if len(first.split()) == _NUM_FIELDS[0]:
-        rows, lines = tum_rows(path)
-        far = np.flatnonzero(np.abs(rows[:, 1:4]).max(axis=1) > FARTHEST)
+        filed = read_tum_path(path)
+        far = np.flatnonzero(np.abs(filed.poses[:, :3]).max(axis=1) > FARTHEST)
         if far.size:
             message = f"expected positions within {FARTHEST:.0e} m of the origin, got one beyond"
-            raise FileError(path, message, line=lines[int(far[0])])
-        return np.column_stack([rows[:, 1:4], unit_quaternions(path, rows[:, 4:], lines)]), []
+            raise FileError(path, message, line=filed.lines[int(far[0])])
+        return filed.poses, []
     return _kitti_poses(path)
 
 
 def _kitti_poses(path: StrPath) -> tuple[FloatArray, list[str]]:
-    numbers: list[list[float]] = []
-    lines: list[int] = []
-    for number, line in numbered_lines(read_text(path)):
-        numbers.append(finite_numbers(path, number, line.split(), _KITTI))
-        lines.append(number)
+    numbers, lines = numbered_rows(path, _KITTI)
     poses, wrong = poses_of_matrices(np.array(numbers).reshape(-1, 3, 4))
     if wrong is not None:
         message = "expected a rotation matrix in columns 1-3, 5-7 and 9-11 and a position within 1e9 m, got other numbers"

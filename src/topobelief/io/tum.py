@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from topobelief.arrays import FloatArray
-from topobelief.errors import FileError
 from topobelief.geometry.planar import upright_poses
-from topobelief.io.filed_path import FiledPath, finite_numbers, numbered_lines, path_of_quaternions
-from topobelief.io.files import StrPath, read_text
+from topobelief.io.filed_path import FiledPath, numbered_rows, path_of_quaternions
+from topobelief.io.files import StrPath
 
 _COLUMNS = "timestamp x y z qx qy qz qw"
 
@@ -21,26 +18,8 @@ def read_tum_path(path: StrPath) -> FiledPath:
     FileError
         Names the line that is not what it should be.
     """
-    rows, lines = tum_rows(path)
-    return path_of_quaternions(path, rows[:, 1:].tolist(), lines)
-
-
-def tum_rows(path: StrPath) -> tuple[FloatArray, list[int]]:
-    """The rows of a file in TUM format, shape (N, 8), N > 0, and their lines.
-
-    Raises
-    ------
-    FileError
-        Names the line that is not eight finite numbers.
-    """
-    rows: list[list[float]] = []
-    lines: list[int] = []
-    for number, line in numbered_lines(read_text(path)):
-        rows.append(finite_numbers(path, number, line.split(), _COLUMNS))
-        lines.append(number)
-    if not rows:
-        raise FileError(path, f"expected at least one pose {_COLUMNS}, got none")
-    return np.array(rows), lines
+    rows, lines = numbered_rows(path, _COLUMNS)
+    return path_of_quaternions(path, [row[1:] for row in rows], lines)
 
 
 def tum_of_path(poses: FloatArray) -> str:

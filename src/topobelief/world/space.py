@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Protocol
 
+import numpy as np
 from numpy.typing import ArrayLike
 
-from topobelief.arrays import BoolArray, FloatArray
+from topobelief.arrays import BoolArray, FloatArray, frozen_floats
 from topobelief.errors import InvalidInputError
 from topobelief.graph.pose_graph import PoseGraph
 
@@ -39,6 +40,36 @@ class FreeSpace(Protocol):
     def visible(self, starts: ArrayLike, ends: ArrayLike) -> BoolArray:
         """Whether nothing stands on the line of sight from each start to its end, shape (N,)."""
         ...
+
+
+def checked_places(places: ArrayLike, name: str, dim: int) -> FloatArray:
+    """Finite places of shape (N, dim), read-only.
+
+    Raises
+    ------
+    InvalidInputError
+        Names the first that is not finite.
+    """
+    array = frozen_floats(places, name=name)
+    array = array.reshape(0, dim) if array.size == 0 else array
+    if array.ndim != 2 or array.shape[1] != dim:
+        raise InvalidInputError(f"expected {name} of shape (N, {dim}), got {array.shape}")
+    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
+    if bad.size:
+        raise InvalidInputError(f"expected finite {name}, got nan or inf in row {bad[0]}")
+    return array
+
+
+def checked_radius(radius: float) -> float:
+    """A finite radius of at least 0, metres.
+
+    Raises
+    ------
+    InvalidInputError
+    """
+    if not (np.isfinite(radius) and radius >= 0):
+        raise InvalidInputError(f"expected a radius of at least 0 m, got {radius}")
+    return float(radius)
 
 
 def seen_by(world: FreeSpace, places: FloatArray) -> FloatArray:

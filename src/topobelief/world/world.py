@@ -22,6 +22,7 @@ from topobelief.errors import InvalidInputError, InvalidMapError
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.world import shapes
 from topobelief.world.cells import region_of_cells
+from topobelief.world.space import checked_places, checked_radius
 from topobelief.world.trajectory import region_of_trajectory
 
 Extent = tuple[float, float, float, float]  # x_min, y_min, x_max, y_max
@@ -188,11 +189,11 @@ class World:
 
     def contains(self, points: ArrayLike) -> BoolArray:
         """Whether each point is free, shape (N,); the boundary is not."""
-        return self._region.contains(_checked_points(points, "points"))
+        return self._region.contains(checked_places(points, "points", 2))
 
     def clearance(self, points: ArrayLike) -> FloatArray:
         """Distance to the nearest obstacle or bound, metres, shape (N,); negative in obstacles and out of bounds."""
-        xy = _checked_points(points, "points")
+        xy = checked_places(points, "points", 2)
         distances = self._region.boundary_distances(xy)
         return np.where(self._region.contains(xy), distances, -distances)
 
@@ -210,11 +211,11 @@ class World:
         shape (N,), bool
             Exact to rounding; a disc that touches is not free.
         """
-        a, b = _checked_points(starts, "starts"), _checked_points(ends, "ends")
+        a, b = checked_places(starts, "starts", 2), checked_places(ends, "ends", 2)
         if a.shape != b.shape:
             raise InvalidInputError(f"expected as many ends as starts, got {len(b)} and {len(a)}")
         free = self._region.contains(a) & self._region.contains(b) & self._region.contains((a + b) / 2)  # quick
-        free[free] = ~self._region.boundary_near(a[free], b[free], _checked_radius(radius))  # and exact
+        free[free] = ~self._region.boundary_near(a[free], b[free], checked_radius(radius))  # and exact
         return free
 
     def visible(self, starts: ArrayLike, ends: ArrayLike) -> BoolArray:
@@ -248,8 +249,8 @@ class World:
         point : shape (2,)
             A place with more clearance than the radius.
         """
-        place = _checked_points(np.reshape(point, (1, -1)), "point")[0]
-        free = shapes.eroded(self.free, (1 - _EROSION_SLACK) * _checked_radius(radius))
+        place = checked_places(np.reshape(point, (1, -1)), "point", 2)[0]
+        free = shapes.eroded(self.free, (1 - _EROSION_SLACK) * checked_radius(radius))
         component = shapes.nearest_part(free, place)
         if component is None:
             raise InvalidMapError(f"expected room for a disc of radius {radius:g} m, got none in the whole world")
@@ -275,23 +276,6 @@ def _checked_polygon(polygon: ArrayLike | Polygon, index: int) -> Polygon:
     if problem := shapes.problem(polygon) or ("no area" if polygon.area == 0 else ""):
         raise InvalidMapError(f"expected a polygon that does not cross itself, got {problem} at polygon {index}")
     return polygon
-
-
-def _checked_points(points: ArrayLike, name: str) -> FloatArray:
-    array = frozen_floats(points, name=name)
-    array = array.reshape(0, 2) if array.size == 0 else array
-    if array.ndim != 2 or array.shape[1] != 2:
-        raise InvalidInputError(f"expected {name} of shape (N, 2), got {array.shape}")
-    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
-    if bad.size:
-        raise InvalidInputError(f"expected finite {name}, got nan or inf in row {bad[0]}")
-    return array
-
-
-def _checked_radius(radius: float) -> float:
-    if not (np.isfinite(radius) and radius >= 0):
-        raise InvalidInputError(f"expected a radius of at least 0 m, got {radius}")
-    return float(radius)
 
 
 def _numbers(values: FloatArray) -> str:

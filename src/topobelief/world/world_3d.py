@@ -14,6 +14,7 @@ from topobelief.arrays import BoolArray, FloatArray, IntArray, frozen_floats
 from topobelief.errors import InvalidInputError, InvalidMapError, require_positive
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.world.parts import Parts
+from topobelief.world.space import checked_places, checked_radius
 from topobelief.world.trajectory import default_width, odometry_steps
 from topobelief.world.tubes import Tubes
 from topobelief.world.voxels import MOST_CELLS, Voxels
@@ -173,7 +174,7 @@ class World3D:
 
     def contains(self, points: ArrayLike) -> BoolArray:
         """Whether each point is free, shape (N,)."""
-        return self.space.contains(_checked(points, "points"))
+        return self.space.contains(checked_places(points, "points", 3))
 
     def clearance(self, points: ArrayLike) -> FloatArray:
         """Distance to what is not free, metres, shape (N,); negative where a point is not free.
@@ -181,7 +182,7 @@ class World3D:
         Exact among cubes. Around a trajectory it is how much further from the trajectory a place might be, measured across it:
         where two parts of it are near to each other, there may be more room than that.
         """
-        return self.space.clearance(_checked(points, "points"))
+        return self.space.clearance(checked_places(points, "points", 3))
 
     def segments_free(self, starts: ArrayLike, ends: ArrayLike, radius: float) -> BoolArray:
         """Whether a ball may move along each segment: its centre stays more than `radius` from all that is not free.
@@ -197,12 +198,10 @@ class World3D:
         shape (N,), bool
             Exact to 1e-9 of a cube or of the way.
         """
-        a, b = _checked(starts, "starts"), _checked(ends, "ends")
+        a, b = checked_places(starts, "starts", 3), checked_places(ends, "ends", 3)
         if a.shape != b.shape:
             raise InvalidInputError(f"expected as many ends as starts, got {len(b)} and {len(a)}")
-        if not (np.isfinite(radius) and radius >= 0):
-            raise InvalidInputError(f"expected a radius of at least 0 m, got {radius}")
-        return self.space.segments_free(a, b, radius)
+        return self.space.segments_free(a, b, checked_radius(radius))
 
     def visible(self, starts: ArrayLike, ends: ArrayLike) -> BoolArray:
         """Whether the line of sight from each start to its end is free, shape (N,)."""
@@ -227,14 +226,3 @@ class World3D:
     def backbone(self, radius: float) -> tuple[FloatArray, IntArray]:
         """Places that a roadmap should have, and pairs of them between which a ball may move: shapes (N, 3) and (M, 2)."""
         return self.space.backbone(radius)
-
-
-def _checked(points: ArrayLike, name: str) -> FloatArray:
-    array = frozen_floats(points, name=name)
-    array = array.reshape(0, 3) if array.size == 0 else array
-    if array.ndim != 2 or array.shape[1] != 3:
-        raise InvalidInputError(f"expected {name} of shape (N, 3), got {array.shape}")
-    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
-    if bad.size:
-        raise InvalidInputError(f"expected finite {name}, got nan or inf in row {bad[0]}")
-    return array
