@@ -268,11 +268,11 @@ FieldOfView = Annotated[
         rich_help_panel=_FACTORS,
     ),
 ]
-ObservationsPerPose = Annotated[
+ObservationCap = Annotated[
     int | None,
     typer.Option(min=1, metavar="N", help="… at most so many a pose.", show_default="learned", rich_help_panel=_FACTORS),
 ]
-ObservationProbability = Annotated[
+ObservationChance = Annotated[
     float | None,
     typer.Option(
         metavar="P",
