@@ -46,7 +46,7 @@ def test_observations_are_learned_and_counted_apart_from_closures(topobelief, st
 
 
 def test_what_options_state_is_not_learned(topobelief, street):
-    rule = ["--observation-range", 4.1, "--field-of-view", 6.28, "--max-observations", 3, "--detection-rate", 0.5]
+    rule = ["--observation-range", 4.1, "--field-of-view", 6.28, "--observation-cap", 3, "--observation-chance", 0.5]
     shown = topobelief(plan(street, "--candidates", 1, *rule)).out
     assert "landmarks: at most 3 a pose within 4.1 m, 360° ahead, in sight or not, 50 % of opportunities" in " ".join(
         shown.split()
@@ -60,8 +60,8 @@ def test_what_options_state_is_not_learned(topobelief, street):
     [
         (["--observation-range", 0], "expected a number above 0, got 0"),
         (["--field-of-view", 90], "expected at most 6.28319, got 90; angles are in radians"),
-        (["--detection-rate", 2], "expected a probability above 0 and at most 1, got 2"),
-        (["--max-observations", 0], "Input should be greater than or equal to 1"),
+        (["--observation-chance", 2], "expected a probability above 0 and at most 1, got 2"),
+        (["--observation-cap", 0], "Input should be greater than or equal to 1"),
     ],
 )
 def test_numbers_out_of_range_are_refused(topobelief, street, options, message):

@@ -16,8 +16,8 @@ from topobelief.world import FreeSpace
 _OPTIONS = {
     "max_range": "--observation-range",
     "field_of_view": "--field-of-view",
-    "max_per_pose": "--max-observations",
-    "probability": "--detection-rate",
+    "max_per_pose": "--observation-cap",
+    "probability": "--observation-chance",
 }
 
 

@@ -156,11 +156,11 @@ FieldOfView = Annotated[
         rich_help_panel=_FACTORS,
     ),
 ]
-MaxObservations = Annotated[
+ObservationCap = Annotated[
     int | None,
     typer.Option(min=1, metavar="N", help="… at most so many a pose.", show_default="learned", rich_help_panel=_FACTORS),
 ]
-DetectionRate = Annotated[
+ObservationChance = Annotated[
     float | None,
     typer.Option(
         metavar="P",
