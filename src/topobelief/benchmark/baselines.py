@@ -247,7 +247,7 @@ def _gtsam_marginals(graph: PoseGraph) -> Callable[[Action], Evaluate]:
 
 
 def _error(graph: PoseGraph, action: Action) -> float:
-    """A factor of the posterior's information matrix, and one triangular solution for each column of Pi."""
+    """A factor of the posterior's information matrix, and the diagonal blocks of its inverse at the sample."""
     return expected_errors(graph, action).map_rmse
 
 
