@@ -91,21 +91,23 @@ class Evaluations:
         source, target = action.edges.T
         return bool(((source >= self._planner.graph.num_nodes) & (target < self._planner.graph.num_nodes)).any())
 
-    def action(self, walk: Walk) -> Action:
-        """What driving a walk adds to the graph; its cost is that of its length."""
-        (action,) = self._predict([self.path(walk)])
-        return Action(
-            action.poses,
-            action.edges,
-            action.information,
-            cost=self.cost_per_metre * path_length(self.path(walk)),
-            length=action.length,
-            probabilities=action.probabilities,
-        )
+    def actions(self, walks: Sequence[Walk]) -> list[Action]:
+        """What driving each of some walks adds to the graph; its cost is that of its length."""
+        return [
+            Action(
+                action.poses,
+                action.edges,
+                action.information,
+                cost=self.cost_per_metre * path_length(self.path(walk)),
+                length=action.length,
+                probabilities=action.probabilities,
+            )
+            for walk, action in zip(walks, self._predict([self.path(walk) for walk in walks]), strict=True)
+        ]
 
     def value_with_map_alone(self, walk: Walk) -> float:
         """Of a walk if the loops that its own poses close with each other were not closed, cost included."""
-        action, num_poses = self.action(walk), self._planner.graph.num_poses
+        (action,), num_poses = self.actions([walk]), self._planner.graph.num_poses
         inner, apart = action.edges.min(axis=1) >= num_poses, np.abs(np.diff(action.edges, axis=1)[:, 0])
         kept = ~(inner & (apart > 1))  # odometry joins a pose to the one before
         if kept.all():
