@@ -1,6 +1,6 @@
 """The bounds by flows and by windows together: the largest counts.
 
-Coarse layers give a first bound in a fraction of the time that fine ones take; with cells it is often the better one at first."""
+Coarse layers give a first bound in a fraction of the time that fine ones take, with cells often a better one at first."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ _ARCS = 400_000  # aimed at: as many layers as make about so many arcs
 _FINEST = 40  # pieces per spacing
 _FINE = 10  # pieces per pose; where more are affordable, steps are cheap and splitting does without cells
 _ROWS = 6000  # at most so many for all pairs of a new pose and a cell, kappa for each
-_MOST_CELLS = 80
+_MOST_CELLS = 25
 _MOST_IN_WINDOWS = 1500  # seen poses, the covariance between all of which windows need
 _ARCS_OF_WINDOWS = 3_000_000
 _SAME_PLACE = 1e-9  # metres
@@ -187,12 +187,9 @@ def walk_bounds(
     delta = spacing / pieces_per_pose
     first_vertex = at_pose if has_lead else int(place[start])
     counts_idle = objective in ("joint", "per_pose")
-    cells = _cells(
-        ways,
-        delta,
-        closures.radius,
-        1 if counts_idle or pieces_per_pose > _FINE else round(_ROWS * spacing / (graph.tangent_dim * whole)),
-    )
+    mixes = objective == "error" and pieces_per_pose <= _FINE  # a flow without cells mixes corridors more than it saves time
+    most_cells = round(_ROWS * spacing / (graph.tangent_dim * whole)) if mixes else 1
+    cells = _cells(ways, delta, closures.radius, most_cells)
     layers = build_layers(ways, first_vertex, remaining, is_end, whole, delta, pieces_per_pose, cells)
     num_new = max(1, int(layers.records.number.max(initial=1)))
     among = int(np.searchsorted(graph.pose_indices, pose))
