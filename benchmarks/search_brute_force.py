@@ -146,7 +146,7 @@ def value_found(case: Case, objective: str, optimum: float, turn: float | None =
 def bounded(case: Case, objective: str, least: float) -> tuple[float, float]:
     """By how much any step of the bound exceeds the least value (-inf: there is no walk to bound), and the last bound."""
     make = partial(walk_bounds, case.graph, case.roadmap, objective=objective, **case.arguments())
-    bound = BothBounds(lambda pieces: make(pieces_per_pose=pieces), lambda arcs: FINE)
+    bound = BothBounds(lambda pieces: make(pieces_per_pose=pieces or FINE), lambda arcs: FINE)
     highest = -np.inf
     for step in range(2 * STEPS):
         if bound.finished:

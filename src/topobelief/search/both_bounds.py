@@ -13,8 +13,8 @@ from topobelief.search.flows import FlowBound
 from topobelief.search.window_bound import WindowBound
 
 BoundName = Literal["flows", "windows"]
-Make = Callable[[int], tuple[FlowBound, WindowBound | None]]
-"""From the number of layers per new pose to the bounds."""
+Make = Callable[[int | None], tuple[FlowBound, WindowBound | None]]
+"""From the number of layers per new pose, None for as many as are affordable, to the bounds."""
 
 COARSEST = 3
 """Layers per new pose."""
@@ -63,16 +63,15 @@ class BothBounds:
             self._add(COARSEST)
             return self.flows[0].step()
         if not self._is_complete:
-            pieces = self._affordable(self.flows[0].num_arcs / COARSEST)
-            if pieces >= _MUCH_FINER:
-                self._add(pieces)
+            if self._affordable(self.flows[0].num_arcs / COARSEST) >= _MUCH_FINER:
+                self._add(None)
             self._is_complete = True
         flows = self.flows[-1]
         if self._windows is not None and flows.num_steps and not self._windows.finished:
             return self._windows.step()
         return flows.step()
 
-    def _add(self, pieces_per_pose: int) -> None:
+    def _add(self, pieces_per_pose: int | None) -> None:
         flows, self._windows = self._make(pieces_per_pose)
         flows.suggest(self._suggested)
         self.flows.append(flows)

@@ -98,9 +98,10 @@ class FlowBound:
         return float(self._by_layer[-1])
 
     @property
-    def num_arcs(self) -> int:
-        """Of the layers."""
-        return len(self._rewards.layers.arcs.source)
+    def num_arcs(self) -> float:
+        """Of the layers, about, if there were one cell."""
+        layers = self._rewards.layers
+        return len(layers.arcs.source) * len(self._vertices) / layers.num_spots
 
     @property
     def counts_costs(self) -> bool:
