@@ -20,6 +20,7 @@ import itertools
 import sys
 import time
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +33,7 @@ from topobelief.runs.journal import Journal
 from topobelief.runs.lock import alone
 from topobelief.runs.run import run_tasks
 from topobelief.search.anytime import SearchProgress
+from topobelief.search.both_bounds import BothBounds
 from topobelief.search.walk_bounds import walk_bounds
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
@@ -39,7 +41,8 @@ from roadmap_walks import Case, random_case
 
 OBJECTIVES = ("error", "map", "joint", "per_pose")
 FEWEST, MOST = 30, 20_000
-STEPS = 4  # of the bound, before the best value is told to it and after
+STEPS = 5  # of the bound, before the best value is told to it and after
+FINE = 10  # layers per new pose of the second bound; the first one has coarse layers
 SAME = 1e-9  # relative
 SEEDS_AT_ONCE = 200
 
@@ -142,15 +145,16 @@ def value_found(case: Case, objective: str, optimum: float, turn: float | None =
 
 def bounded(case: Case, objective: str, least: float) -> tuple[float, float]:
     """By how much any step of the bound exceeds the least value (-inf: there is no walk to bound), and the last bound."""
-    try:
-        bound, _ = walk_bounds(case.graph, case.roadmap, objective=objective, **case.arguments())
-    except PlanningError:  # no edge within the length: staying is all there is
-        return -np.inf, least
+    make = partial(walk_bounds, case.graph, case.roadmap, objective=objective, **case.arguments())
+    bound = BothBounds(lambda pieces: make(pieces_per_pose=pieces or FINE), lambda arcs: FINE)
     highest = -np.inf
     for step in range(2 * STEPS):
         if bound.finished:
             break
-        bound.step()
+        try:
+            bound.step()
+        except PlanningError:  # no edge within the length: staying is all there is
+            return -np.inf, least
         highest = max(highest, bound.lower_bound)
         if step + 1 >= STEPS:
             bound.prune(least)

@@ -1,5 +1,7 @@
 """The bound by flows: no walk is better."""
 
+import contextlib
+import itertools
 import math
 from dataclasses import replace
 
@@ -8,6 +10,7 @@ import pytest
 
 import topobelief as tb
 from roadmap_walks import Case, random_case, with_landmarks
+from topobelief.search.bound import OutOfTimeError
 from topobelief.search.flows import FlowBound
 from topobelief.search.front_bounds import FrontBounds
 from topobelief.search.walk_bounds import walk_bounds
@@ -194,7 +197,7 @@ def test_no_walk_of_any_length_is_below_the_bound_for_it(seed, objective):
     lengths = np.array([case.length(walk) for walk in walks])
     values = case.values(objective, walks) - case.cost_per_metre * lengths
     whole, _ = walk_bounds(case.graph, case.roadmap, objective=objective, **case.arguments())
-    front = FrontBounds(whole, float(lengths.min()), case.max_length)
+    front = FrontBounds([whole], float(lengths.min()), case.max_length)
     known = iter((math.inf, *np.sort(values)[::-1].tolist()))
 
     def best_within(length):
@@ -232,3 +235,29 @@ def test_walks_that_are_known_to_be_good_are_where_it_begins(objective):
         bound.prune(float(values.min()))
         bound.step()
         assert bound.lower_bound <= values.min() + 1e-9 * abs(values.min())
+
+
+@pytest.mark.parametrize("objective", ["error", "map"])
+def test_work_that_a_check_ends_may_go_on_later(objective):
+    """Wherever a step is broken off, the bound holds, and the next steps get as far as without."""
+    case = random_case(17)
+    least = float(case.values(objective, case.walks()).min())
+    calls = itertools.count(1)
+    most = math.inf
+
+    def check():
+        if next(calls) > most:
+            raise OutOfTimeError
+
+    bound, _ = walk_bounds(case.graph, case.roadmap, objective=objective, check=check, **case.arguments())
+    for allowed in [*range(1, 16), math.inf, math.inf, math.inf]:
+        calls, most, before = itertools.count(1), allowed, bound.lower_bound
+        with contextlib.suppress(OutOfTimeError):
+            bound.step()
+        assert before <= bound.lower_bound <= least + 1e-9 * abs(least)
+        bound.prune(least)
+    whole, _ = walk_bounds(case.graph, case.roadmap, objective=objective, **case.arguments())
+    for _ in range(3):
+        whole.step()
+        whole.prune(least)
+    assert bound.lower_bound >= whole.lower_bound - 1e-9 * abs(least)

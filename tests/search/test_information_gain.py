@@ -16,7 +16,7 @@ from topobelief.search.reduced_prior import ReducedPrior
 KINDS = ("map", "joint", "error")
 
 
-def _prior(case, seen) -> ReducedPrior:
+def _prior(case, seen, factors=None) -> ReducedPrior:
     return ReducedPrior(
         case.graph,
         case.graph.num_poses - 1,
@@ -25,7 +25,21 @@ def _prior(case, seen) -> ReducedPrior:
         probability=case.rule.probability,
         min_index_gap=case.rule.min_index_gap,
         with_errors=True,
+        factors=factors,
     )
+
+
+@pytest.mark.parametrize("held", [None, 0])
+def test_factors_that_a_planner_has_made_give_the_same_prior(held):
+    """Those that hold another pose give the sample alone."""
+    case = random_case(16)
+    planner = tb.Planner(case.graph, objective="error", engine="incremental", anchor=held)
+    planner.entropies([case.action(case.walks()[0])])
+    every = np.arange(case.graph.num_poses)
+    shared, own = _prior(case, every, planner.factors), _prior(case, every)
+    assert shared.mean_square == pytest.approx(own.mean_square, rel=1e-9)
+    assert shared.sigma(every, every) == pytest.approx(own.sigma(every, every), rel=1e-9, abs=1e-12)
+    assert shared.kernel(every, every) == pytest.approx(own.kernel(every, every), rel=1e-9, abs=1e-12)
 
 
 def _random_plan(rng: np.random.Generator, count: int, num_seen: int) -> Plan:

@@ -365,6 +365,16 @@ def test_no_bound_is_begun_that_the_time_does_not_allow(monkeypatch):
     assert math.isinf(search(graph, roadmap, **options).lower_bound)
 
 
+def test_the_first_bound_may_take_the_time_of_refinement():
+    """By a clock that goes on by 0.01 s whenever it is read: search alone has time for few steps, and the bound comes after."""
+    graph, roadmap = scene(5, num_vertices=8)
+    ticks = itertools.count()
+    options = {"goal": roadmap.vertices[1], "max_detour": 1.5, "turn": None, "refine": True, "deadline": 0.5}
+    found = search(graph, roadmap, clock=lambda: next(ticks) / 100, **options)
+    assert math.isfinite(found.lower_bound)
+    assert found.seconds < 0.7
+
+
 def test_a_search_stops_after_so_many_evaluations_or_when_nothing_more_than_enough_is_left():
     graph, roadmap = scene(5, num_vertices=11)
     options = {"max_length": 5.0, "turn": None}

@@ -71,18 +71,45 @@ def test_it_is_nearly_exact_for_one_pose():
 
 
 def test_the_larger_of_both_bounds_counts_and_has_its_name():
+    """That of coarse layers is there after the first step, and counts as long as none is larger."""
     case = _one_closure_a_pose(17)
-    flows, windows = walk_bounds(case.graph, case.roadmap, objective="map", **case.arguments())
-    both = BothBounds(flows, windows)
-    both.prune(float(case.values("map", case.walks()).min()))
+    made = []
+
+    def make(pieces):
+        made.append(walk_bounds(case.graph, case.roadmap, objective="map", pieces_per_pose=pieces, **case.arguments()))
+        return made[-1]
+
+    both = BothBounds(make, lambda arcs: 20)
+    assert math.isinf(both.lower_bound)
+    least = float(case.values("map", case.walks()).min())
+    both.prune(least)
     names = set()
-    for _ in range(12):
+    for step in range(14):
         both.step()
-        assert both.lower_bound == max(flows.lower_bound, windows.lower_bound)
+        assert len(made) == min(step + 1, 2)
+        flows, windows = made[-1]
+        assert both.lower_bound == max(made[0][0].lower_bound, flows.lower_bound, windows.lower_bound)
+        assert math.isfinite(both.lower_bound)
+        assert both.lower_bound <= least + 1e-9 * abs(least)
         assert both.by in both.covers
         names.add(both.by)
     assert windows.finished
     assert "flows" in names
+
+
+def test_where_fine_layers_are_not_affordable_the_coarse_ones_are_all():
+    case = _one_closure_a_pose(17)
+    made = []
+
+    def make(pieces):
+        made.append(walk_bounds(case.graph, case.roadmap, objective="map", pieces_per_pose=pieces, **case.arguments()))
+        return made[-1]
+
+    both = BothBounds(make, lambda arcs: 3)
+    for _ in range(12):
+        both.step()
+    assert len(made) == 1
+    assert made[0][1].finished
 
 
 def test_there_are_none_for_errors_and_for_several_closures_a_pose():
@@ -106,7 +133,7 @@ def test_no_walk_is_below_any_bound(seed, objective):
         windows.step()
         assert windows.lower_bound <= values.min() + tolerance.max()
     plain = values - case.cost_per_metre * lengths
-    front = FrontBounds(flows, float(lengths.min()), case.max_length)
+    front = FrontBounds([flows], float(lengths.min()), case.max_length)
     flows.step()
     for _ in range(10):
         if not front.finished:

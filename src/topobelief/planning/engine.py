@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from topobelief.graph.action import Action, posterior
 from topobelief.graph.alignment import DEFAULT_SAMPLE_SIZE
 from topobelief.graph.fisher import FisherRows, fisher_rows
 from topobelief.graph.pose_graph import PoseGraph
+
+if TYPE_CHECKING:
+    from topobelief.forms.prior_factors import PriorFactors  # needs numba, which the other engine does without
 
 Group = tuple[IntArray, Forms[Any]]
 """Places in a list of actions, and the forms after these."""
@@ -39,6 +42,11 @@ class Engine(ABC):
 
     def __init__(self, graph: PoseGraph, anchor: int, *, sample_size: int = DEFAULT_SAMPLE_SIZE) -> None:
         self.graph, self.anchor, self.sample_size = graph, anchor, sample_size
+
+    @property
+    def factors(self) -> PriorFactors | None:
+        """Factors of the prior, where the engine keeps them."""
+        return None
 
     @abstractmethod
     def groups(self, actions: Sequence[Action]) -> list[Group]:

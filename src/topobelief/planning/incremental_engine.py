@@ -39,6 +39,10 @@ class IncrementalEngine(Engine):
         super().__init__(graph, anchor, sample_size=sample_size)
         self._prior = PriorFactors(graph, anchor, earlier=earlier, sample_size=sample_size)
 
+    @property
+    def factors(self) -> PriorFactors:
+        return self._prior
+
     def groups(self, actions: Sequence[Action]) -> list[Group]:
         """All at once; what a new factor of the graph gives at less cost, after many closures, is left to `from_scratch`."""
         return [(np.arange(len(actions)), IncrementalForms(self._prior, ActionBatch(self.graph, tuple(actions))))]

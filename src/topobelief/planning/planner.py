@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
@@ -36,6 +36,9 @@ from topobelief.planning.engine import Engine
 from topobelief.planning.registry import ALL_OBJECTIVES, AUTO, BOUNDS, ENGINES, FOCUSED, SIGNATURES, chosen
 from topobelief.planning.search import Clock, Progress, Search
 from topobelief.signatures.von_neumann import DENSE_SPECTRUM_SIZE, expected_spectrum_seconds
+
+if TYPE_CHECKING:
+    from topobelief.forms.prior_factors import PriorFactors  # needs numba, which not every engine does
 
 _INCREMENTAL_WORK = 250_000  # actions times edges of the prior above which increments are faster
 _INVERSE_WORK = 100  # times that of a determinant
@@ -172,6 +175,12 @@ class Planner:
     def graph(self) -> PoseGraph:
         """The prior."""
         return self._graph
+
+    @property
+    def factors(self) -> PriorFactors | None:
+        """Factors of the prior that the incremental engine has made and keeps; None where it has not been used."""
+        engine = self._engines.get("incremental")
+        return None if engine is None else engine.factors
 
     def extended(self, graph: PoseGraph) -> Planner:
         """A planner on a graph that has grown: the chosen path was driven, or new measurements came in.

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 
 from topobelief.arrays import FloatArray, IntArray
-from topobelief.search.bound import WalkBound
+from topobelief.search.bound import Check, OutOfTimeError, WalkBound
 from topobelief.search.evaluations import SAME_VALUE, Evaluations
 from topobelief.search.local_search import LocalSearch
 from topobelief.search.walks import Walk
@@ -52,9 +52,12 @@ class AnytimeSearch:
     evaluations, local
         Local search evaluates its walks there.
     make_bounds
-        Called once, when local search has found first values: the bound, and those of shorter walks. None: search without.
+        Called once, when local search has found first values: the bound, and those of shorter walks, whose work calls the
+        check that it is given. None: search without.
     began, deadline
         Seconds: on the clock, and from then on; None for no deadline.
+    first_bound_by
+        The deadline while nothing is known of the bound. Default: the same.
     gap
         To stop at, in the unit of the objective.
     enough
@@ -69,10 +72,11 @@ class AnytimeSearch:
         self,
         evaluations: Evaluations,
         local: LocalSearch,
-        make_bounds: Callable[[], tuple[WalkBound, FrontBounds]] | None,
+        make_bounds: Callable[[Check], tuple[WalkBound, FrontBounds]] | None,
         *,
         began: float,
         deadline: float | None,
+        first_bound_by: float | None = None,
         gap: float,
         enough: float = math.inf,
         max_evaluations: int | None = None,
@@ -83,6 +87,7 @@ class AnytimeSearch:
         self._began, self._gap, self._enough, self._on_progress = began, gap, enough, on_progress
         self._clock = clock
         self._end = math.inf if deadline is None else began + deadline
+        self._end_of_first = self._end if first_bound_by is None else max(self._end, began + first_bound_by)
         self._warm = math.inf if deadline is None else began + WARM_UP_SHARE * deadline
         self._most = math.inf if max_evaluations is None else max_evaluations
         self._bound: WalkBound | None = None
@@ -93,6 +98,7 @@ class AnytimeSearch:
         self._at_best = 0  # evaluations made when the best value was found
         self._restarts = 0  # of local search, since then
         self._batch = _FIRST_BATCH
+        self._pace = 0.0  # seconds an evaluation, in the last batch
         self._ahead = 0.0  # seconds that local search has had more than the bound; with a deadline each gets half
         self._bounds: list[float] = []  # after each step
 
@@ -135,6 +141,9 @@ class AnytimeSearch:
                 if self.lower_bound >= self._enough:
                     return "enough"
                 if self._clock() >= self._end:
+                    if math.isinf(self.lower_bound) and not self._no_time:
+                        self._bound_on()
+                        self._note()
                     return "deadline"
                 if len(self._evaluations) >= self._most:
                     self._bound_front()
@@ -158,14 +167,22 @@ class AnytimeSearch:
         """One batch of local search; whether there was anything left worth trying."""
         if len(self._evaluations) - self._at_best > _PATIENCE:
             return False
-        size, self._batch = self._batch, min(2 * self._batch, _LARGEST_BATCH)
-        if self._local.step(size):
-            return True
-        while self._restarts < _MOST_RESTARTS:
+        began, before = self._clock(), len(self._evaluations)
+        size, self._batch = max(1, min(self._batch, self._evaluations_left)), min(2 * self._batch, _LARGEST_BATCH)
+        moved = bool(self._local.step(size))
+        while not moved and self._restarts < _MOST_RESTARTS:
             self._restarts += 1
-            if self._local.restart(size):
-                return True
-        return self._local.widen(size) > 0
+            moved = bool(self._local.restart(size))
+        moved = moved or self._local.widen(size) > 0
+        if (made := len(self._evaluations) - before) > 0:
+            self._pace = (self._clock() - began) / made
+        return moved
+
+    @property
+    def _evaluations_left(self) -> int:
+        """How many end before the deadline, if they take as long as the last ones."""
+        left = (self._end - self._clock()) / max(self._pace, 1e-9)
+        return int(min(max(left, 0.0), _LARGEST_BATCH))
 
     @property
     def _is_warm(self) -> bool:
@@ -178,7 +195,7 @@ class AnytimeSearch:
         if self._make_bounds is None:
             return False
         if self._bound is None or self._front is None:
-            self._bound, self._front = self._make_bounds()
+            self._bound, self._front = self._make_bounds(self._check)
             self._bound.suggest([np.array(walk) for walk in self._evaluations.best_apart(_SUGGESTED)])
         if self._bound.finished or self.proven or self._bound_rests:
             return False
@@ -203,14 +220,23 @@ class AnytimeSearch:
     def _take(self, step: Callable[[], list[IntArray]], kind: str) -> None:
         """One step of a kind; its walks are for local search."""
         began = self._clock()
-        walks = step()
+        try:
+            walks = step()
+        except OutOfTimeError:
+            self._no_time = True
+            return
         self._took[kind].append(self._clock() - began)
         self._local.seed([tuple(walk.tolist()) for walk in walks])
+
+    def _check(self) -> None:
+        if self._clock() >= (self._end_of_first if math.isinf(self.lower_bound) else self._end):
+            raise OutOfTimeError
 
     def _has_time_for(self, kind: str) -> bool:
         """Whether one more step of a kind would end before the deadline, if it takes as long as the last ones."""
         latest = self._took[kind][-_ONE_AS_LONG_AS:] or self._took["whole"][-_ONE_AS_LONG_AS:]
-        return self._clock() + max(latest, default=0.0) <= self._end
+        end = self._end_of_first if math.isinf(self.lower_bound) else self._end
+        return self._clock() + max(latest, default=0.0) <= end
 
     @property
     def _bound_rests(self) -> bool:

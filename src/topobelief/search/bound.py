@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from topobelief.arrays import IntArray
+
+Check = Callable[[], None]
+"""What long work calls now and then, several times a second where it can; what this raises ends the work."""
+
+
+class OutOfTimeError(Exception):
+    """Raised by a check after the deadline; never seen outside of the search."""
+
+
+def unchecked() -> None:
+    """The check of work that may take as long as it does."""
 
 
 class WalkBound(Protocol):

@@ -98,21 +98,23 @@ class Evaluations:
         apart = np.abs(action.edges[:, 0] - action.edges[:, 1])
         return (action.edges.min(axis=1) >= self._planner.graph.num_nodes) & (apart > 1)
 
-    def action(self, walk: Walk) -> Action:
-        """What driving a walk adds to the graph; its cost is that of its length."""
-        (action,) = self._predict([self.path(walk)])
-        return Action(
-            action.poses,
-            action.edges,
-            action.information,
-            cost=self.cost_per_metre * path_length(self.path(walk)),
-            length=action.length,
-            probabilities=action.probabilities,
-        )
+    def actions(self, walks: Sequence[Walk]) -> list[Action]:
+        """What driving each of some walks adds to the graph; its cost is that of its length."""
+        return [
+            Action(
+                action.poses,
+                action.edges,
+                action.information,
+                cost=self.cost_per_metre * path_length(self.path(walk)),
+                length=action.length,
+                probabilities=action.probabilities,
+            )
+            for walk, action in zip(walks, self._predict([self.path(walk) for walk in walks]), strict=True)
+        ]
 
     def value_with_map_alone(self, walk: Walk) -> float:
         """Of a walk if the loops that its own poses close with each other were not closed, cost included."""
-        action = self.action(walk)
+        (action,) = self.actions([walk])
         kept = ~self._own_closures(action)
         if kept.all():
             return self.value(walk)

@@ -20,6 +20,7 @@ import numpy as np
 
 from topobelief.arrays import FloatArray, IntArray
 from topobelief.linalg.block_cholesky import Int32Array
+from topobelief.search.bound import Check, unchecked
 from topobelief.search.criteria import Criterion
 from topobelief.search.information_gain import Slopes, gain_and_slopes
 from topobelief.search.longest_paths import arcs_above, arcs_to_ends, longest_path
@@ -55,7 +56,9 @@ class FlowBound:
         lead_in: float,
         covers: str,
         arcs: Int32Array,
+        check: Check = unchecked,
     ) -> None:
+        self._check = check
         self._prior, self._criterion, self._rewards, self._background = prior, criterion, rewards, background
         self._vertices, self._max_length, self._lead_in, self._covers = vertices, max_length, lead_in, covers
         self._best = math.inf
@@ -82,8 +85,9 @@ class FlowBound:
         which = np.flatnonzero((arcs.target >= 0) | ~ends_late).astype(np.int32)
         which = arcs_to_ends(layers, which)
         return FlowBound(
-            self._prior, self._criterion, free, self._background, self._vertices, max_length, self._lead_in, "", which
-        )
+            self._prior, self._criterion, free, self._background, self._vertices, max_length, self._lead_in, "", which,
+            self._check,
+        )  # fmt: skip
 
     def _last_layer(self, length: float) -> int:
         """The last layer in which walks of up to a length end."""
@@ -92,6 +96,12 @@ class FlowBound:
     @property
     def lower_bound(self) -> float:
         return float(self._by_layer[-1])
+
+    @property
+    def num_arcs(self) -> float:
+        """Of the layers, about, if there were one cell."""
+        layers = self._rewards.layers
+        return len(layers.arcs.source) * len(self._vertices) / layers.num_spots
 
     @property
     def counts_costs(self) -> bool:
@@ -140,6 +150,7 @@ class FlowBound:
         if not self._open:
             return []
         _, _, part = self._open[0]  # it stays there until its work is done, which may be interrupted
+        self._reweigh(part)
         parts = [part]
         if part.fresh >= _STEPS_BEFORE_SPLIT and part.is_ready:
             halves = split(part, self._rewards)
@@ -148,8 +159,11 @@ class FlowBound:
             elif part.slow >= self._slow_steps + 3:
                 self._closed, parts = np.minimum(self._closed, part.by_layer), []
         found: list[IntArray] = []
-        for each in parts:
-            found.extend(self._improved(each))
+        try:
+            for each in parts:
+                found.extend(self._improved(each))
+        finally:
+            self._update()
         heapq.heappop(self._open)
         for each in parts:
             if len(each.arcs) and each.bound < self._best:
@@ -168,6 +182,7 @@ class FlowBound:
         criterion, rewards = self._criterion, self._rewards
         layers = rewards.layers
         plan = self._mixture(part)
+        self._check()
         gain, slopes = gain_and_slopes(self._prior, criterion.kind, plan)
         if part.courses:
             offset = sum(w * slopes.of(c.plan) for w, c in zip(part.weights.tolist(), part.courses, strict=True))
@@ -175,6 +190,7 @@ class FlowBound:
             offset = slopes.of_background(self._background)
         priced = bool(rewards.prices.any()) or criterion.counts_poses
         rate = criterion.least_rate(gain, part.ahead) if priced else 1.0
+        self._check()
         worth = rewards.of_records(slopes, part.records)
         at_end = -criterion.at_end() / rate if priced else np.zeros(rewards.num_new + 1)
         price = criterion.price / rate if priced else 0.0
@@ -185,6 +201,7 @@ class FlowBound:
         toll = part.toll
         weights = rewards.of_arcs(worth, part.arcs, slopes, price, at_end)
         for _ in range(_TOLL_TRIALS):
+            self._check()
             longest = longest_path(layers, part.arcs, weights, toll * rewards.driven)
             if longest.value == -math.inf:
                 part.by_layer, part.arcs = np.full(layers.num_layers, math.inf), part.arcs[:0]
@@ -202,8 +219,6 @@ class FlowBound:
             toll = following
         assert best is not None
         latest = found[-1]
-        found += [course for walk in self._suggested if (course := self._course_of(walk, part, weights, slopes)) is not None]
-        self._suggested = []
         total, lengths, part.toll = best
         part.ahead = total if not priced else max(slopes.of(latest.plan) - offset, 0.0)
         if priced:
@@ -225,11 +240,14 @@ class FlowBound:
         part.slow = part.slow + 1 if bound - part.bound < _SLOW * abs(value - part.bound) else 0
         part.is_ready = converged or part.slow >= self._slow_steps
         part.by_layer = np.maximum(part.by_layer, by_layer)
+        self._check()
+        found += [course for walk in self._suggested if (course := self._course_of(walk, part, weights, slopes)) is not None]
+        self._suggested = []
         if math.isfinite(threshold):
             self._thin(part, weights, lengths, threshold + offset - part.toll * self._max_length)
         part.steps += 1
         part.fresh += 1
-        self._reweigh(part, found)
+        part.found = found
         return [walk for course in found if (walk := rewards.walk(course.arcs, self._vertices, self._max_length)) is not None]
 
     def _course_of(self, walk: IntArray, part: Part, weights: FloatArray, slopes: Slopes) -> Course | None:
@@ -257,14 +275,17 @@ class FlowBound:
             part.arcs = kept
             part.records = used_records(layers.arcs, kept, len(layers.records.number))
 
-    def _reweigh(self, part: Part, found: list[Course]) -> None:
-        """Add walks to the active set and optimise all weights: a concave function over a simplex."""
+    def _reweigh(self, part: Part) -> None:
+        """Add what was found to the active set and optimise all weights: a concave function over a simplex."""
+        found = part.found
+        if not found:
+            return
         used = part.weights > 1e-4
         courses = [course for course, keep in zip(part.courses, used, strict=True) if keep] + found
-        part.courses = courses[-_LARGEST_SET:]
+        courses = courses[-_LARGEST_SET:]
         start = np.concatenate([part.weights[used], np.zeros(len(found))])[-_LARGEST_SET:]
         start = start / start.sum() if start.sum() > 0 else np.full(len(start), 1 / len(start))
-        plans = [course.plan for course in part.courses]
+        plans = [course.plan for course in courses]
         lengths = np.array([plan.length for plan in plans])
         touched = np.flatnonzero(np.array([plan.closures.any(axis=0) for plan in plans]).any(axis=0))
         background = self._background
@@ -273,12 +294,14 @@ class FlowBound:
         scale = 1e-2 * max(abs(criterion.of_gain(0.0)), 1e-300) if criterion.kind == "error" else 1.0
 
         def value(weights: FloatArray) -> tuple[float, FloatArray]:
+            self._check()
             mixture = Mixture(plans, weights, background, _BACKGROUND, only_used=True)
             gained, slopes = gain_and_slopes(self._prior, criterion.kind, mixture, among=touched)
             gradient = linear - criterion.rate(gained) * np.array([slopes.of(plan) for plan in plans])
             return (criterion.of_gain(gained) + float(linear @ weights)) / scale, gradient / scale
 
-        part.weights = best_weights(value, start, lengths, max(self._max_length, float(lengths.min())))
+        weights = best_weights(value, start, lengths, max(self._max_length, float(lengths.min())))
+        part.courses, part.weights, part.found = courses, weights, []
 
     def _mixture(self, part: Part) -> Mixture:
         """The flow of a part; the background to begin with."""

@@ -7,7 +7,7 @@ length is the largest of the bounds for longer ones."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -24,12 +24,12 @@ class FrontBounds:
     Parameters
     ----------
     whole
-        Over the walks within the limit.
+        Bounds over the walks within the limit that there are so far, the one of the finest layers last.
     shortest, max_length
         Of all walks, metres.
     """
 
-    def __init__(self, whole: FlowBound, shortest: float, max_length: float) -> None:
+    def __init__(self, whole: Sequence[FlowBound], shortest: float, max_length: float) -> None:
         self._whole, self._shortest, self._max_length = whole, shortest, max_length
         self._each: list[tuple[float, FlowBound]] = []
 
@@ -52,9 +52,10 @@ class FrontBounds:
             Walks that came up, as of `FlowBound.step`.
         """
         if not self._each:
-            count = _NUM_LENGTHS if self._whole.counts_costs else _NUM_LENGTHS - 1  # without costs the last one is the whole
+            whole = self._whole[-1]
+            count = _NUM_LENGTHS if whole.counts_costs else _NUM_LENGTHS - 1  # without costs the last one is the whole
             lengths = np.linspace(self._shortest, self._max_length, _NUM_LENGTHS)[:count].tolist()
-            self._each = [(length, self._whole.within(length)) for length in reversed(lengths)]
+            self._each = [(length, whole.within(length)) for length in reversed(lengths)]
         length, bound = min((each for each in self._each if not self._rests(each[1])), key=lambda each: each[1].num_steps)
         bound.prune(best_within(length))
         return bound.step()
@@ -64,7 +65,7 @@ class FrontBounds:
 
         By increasing length, the bound falling; where it stays the same, at the greatest such length only.
         """
-        bounds = [bound for _, bound in self._each] + ([] if self._whole.counts_costs else [self._whole])
+        bounds = [bound for _, bound in self._each] + [bound for bound in self._whole if not bound.counts_costs]
         points = np.concatenate([np.zeros((0, 2)), *(bound.by_length() for bound in bounds)])
         points = points[np.lexsort((points[:, 1], points[:, 0]))]
         metres, values = points[:, 0], np.maximum.accumulate(points[::-1, 1])[::-1]  # what holds of longer walks holds too

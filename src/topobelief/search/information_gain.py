@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, cho_solve_banded, cholesky_banded
+from scipy.linalg import cho_factor, cho_solve_banded, cholesky_banded, solve_triangular
 
 from topobelief.arrays import FloatArray, IntArray
 from topobelief.errors import IllConditionedError
@@ -126,7 +126,8 @@ class _Posterior:
         core = root.T @ self.spread
         core[np.diag_indices_from(core)] += 1.0
         self.root_core = cho_factor(core, lower=True, check_finite=False)
-        self.effect = added - self.spread @ cho_solve(self.root_core, self.spread.T, check_finite=False)  # (I + A Sigma)^-1 A
+        half = solve_triangular(self.root_core[0], self.spread.T, lower=True, check_finite=False)
+        self.effect = added - half.T @ half  # (I + A Sigma)^-1 A
 
     @property
     def gain(self) -> float:
@@ -144,16 +145,14 @@ class _Posterior:
         known = self.effect @ rows  # F: P_:: = Sigma_:: - Sigma_:m' F
         if self.kind == "error":
             kernel, inner = prior.kernel(self.touched, seen), prior.kernel(self.touched, self.touched)
-            mixed = kernel - inner @ known
-            among = mixed - (self.sigma @ self.effect) @ mixed  # Q_m',:
+            rows = kernel - inner @ known
             free = prior.kernel_variances[seen] - _products(known, kernel, kappa, twice=True)
             free += _products(known, inner @ known, kappa)
             scale = 1.0
         else:
-            among = rows - self.sigma @ known  # P_m',:
             free = prior.variances[seen] - _products(rows, known, kappa)
             scale = 0.5 * prior.multiplicity
-        cross = -self.lever @ among  # new poses with seen ones
+        cross = np.linalg.multi_dot([self.lever, self.sigma, self.effect, rows]) - self.lever @ rows  # new poses with seen ones
         each, odometry = self._among_new(-cross[:, own])
         cross = cross.reshape(len(self.variables), kappa, len(seen), kappa)
         weight = prior.closures[seen]

@@ -32,6 +32,7 @@ class Part:
     fresh: int = 0  # steps since it was made
     slow: int = 0  # latest steps in a row that hardly raised the bound
     is_ready: bool = False  # to be split
+    found: list[Course] = field(default_factory=list["Course"])  # in the last step; not in the active set yet
 
     @property
     def bound(self) -> float:

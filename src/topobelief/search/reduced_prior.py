@@ -20,7 +20,6 @@ from topobelief.arrays import FloatArray, IntArray
 from topobelief.errors import IllConditionedError
 from topobelief.forms.prior_factors import PriorFactors, form_of
 from topobelief.geometry import Group
-from topobelief.graph.alignment import DEFAULT_SAMPLE_SIZE, Alignment
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg.elimination_paths import FormFactor
 from topobelief.linalg.elimination_tree import EliminationTree
@@ -70,6 +69,7 @@ class ReducedPrior:
         min_index_gap: int,
         with_errors: bool,
         observed: FloatArray | None = None,
+        factors: PriorFactors | None = None,
     ) -> None:
         """The prior on some poses.
 
@@ -90,10 +90,17 @@ class ReducedPrior:
             Whether the expected error of the map is asked for.
         observed : shape (kappa, kappa), optional
             Expected information of an observation, the same along every direction; needed where landmarks are seen.
+        factors
+            Of the graph, which hold the same pose and are used where they are precise. Default: new ones.
         """
         group, kappa = graph.group, graph.tangent_dim
-        form = form_of("joint", PriorFactors(graph, pose))
-        factor = FormFactor.of(EliminationTree.build(graph.edges, graph.num_nodes, pose), form).or_with_strong_rows_last(form)
+        factors = PriorFactors(graph, pose) if factors is None else factors
+        factor = factors.factor("joint", 0.0)
+        holds_pose = factor.tree.held == pose
+        if not holds_pose:
+            form = form_of("joint", factors)
+            tree = EliminationTree.build(graph.edges, graph.num_nodes, pose)
+            factor = FormFactor.of(tree, form).or_with_strong_rows_last(form)
         if not np.isfinite(factor.log_det.error):
             raise IllConditionedError("covariance of the map", factor.log_det.error)
         self._factor, self._seen = factor, seen
@@ -113,8 +120,12 @@ class ReducedPrior:
         self.variances = self._twists @ inverse_diagonal(factor, seen) @ self._twists.transpose(0, 2, 1)
         self.mean_square, self._effects = np.nan, np.zeros((len(seen) * kappa, 0))
         if with_errors:
-            alignment = Alignment.of(graph.positions, DEFAULT_SAMPLE_SIZE)
-            solved = solutions(factor, alignment.nodes, alignment.projection.columns(kappa))
+            alignment = factors.alignment
+            solved = (
+                factors.solutions("joint")
+                if holds_pose
+                else solutions(factor, alignment.nodes, alignment.projection.columns(kappa))
+            )
             self.mean_square = float(solved.trace.value) / len(alignment.nodes)
             effects = self._twists @ solved.values[seen] / math.sqrt(len(alignment.nodes))
             self._effects = effects.reshape(len(seen) * kappa, -1)

@@ -28,7 +28,7 @@ from topobelief.search.reduced_prior import world_to_body
 from topobelief.search.tolls import slack
 from topobelief.search.ways import Sightings, Ways
 
-_MOST_IN_BACKGROUND = 200  # seen poses that it closes loops with
+_MOST_IN_BACKGROUND = 100  # seen poses that it closes loops with
 
 
 @dataclass(frozen=True, slots=True)

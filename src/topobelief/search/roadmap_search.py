@@ -10,7 +10,8 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from importlib.util import find_spec
 
 import numpy as np
@@ -33,7 +34,7 @@ from topobelief.planning.planner import Planner
 from topobelief.planning.registry import default_signature
 from topobelief.search.anytime import WARM_UP_SHARE, AnytimeSearch, SearchProgress
 from topobelief.search.both_bounds import BothBounds
-from topobelief.search.bound import WalkBound
+from topobelief.search.bound import Check, WalkBound
 from topobelief.search.evaluations import Evaluations
 from topobelief.search.front import below_front, on_front
 from topobelief.search.front_bounds import FrontBounds
@@ -41,7 +42,7 @@ from topobelief.search.local_search import LocalSearch, spread_vias
 from topobelief.search.refinement import refine_best
 from topobelief.search.result import SearchResult, Way
 from topobelief.search.topological_prior import OBJECTIVES, constant
-from topobelief.search.walk_bounds import walk_bounds
+from topobelief.search.walk_bounds import affordable, walk_bounds
 from topobelief.search.walks import Walk, Walks
 from topobelief.world import FreeSpace
 from topobelief.world.space import require_room_for, seen_by
@@ -50,7 +51,7 @@ _NUM_CANDIDATES = 60  # vertices to lead walks through
 _DIFFERENT = 0.05  # share of the length limit by which alternatives differ (Fréchet)
 _SAME_PLACE = 1e-9  # metres
 _SHARE_OF_REFINEMENT = 0.4  # of the time and of the evaluations
-_TO_MAKE_BOUND = 1.2e-5  # seconds a metre of the limit and edge in reach: 0.8e-5 to 1.2e-5 on graphs of 3000 to 10 000 poses
+_TO_MAKE_BOUND = 0.8e-6  # seconds a metre of the limit and edge in reach, on graphs of 2700 to 10 000 poses
 
 
 def search_roadmap(
@@ -208,8 +209,9 @@ def search_roadmap(
     candidates = spread_vias(walks, near, _NUM_CANDIDATES)
     local = LocalSearch(walks, evaluations, candidates, rng=np.random.default_rng(seed))
 
-    def bounds() -> tuple[WalkBound, FrontBounds]:
-        flows, windows = walk_bounds(
+    def bounds(check: Check) -> tuple[WalkBound, FrontBounds]:
+        make = partial(
+            walk_bounds,
             graph,
             walks.roadmap,
             start=walks.start,
@@ -227,9 +229,12 @@ def search_roadmap(
             pose=begin.pose,
             metric=metric,
             attitude=attitude,
+            factors=planner.factors,
+            check=check,
         )
+        both = BothBounds(lambda pieces: make(pieces_per_pose=pieces), affordable)
         shortest = 0.0 if goal is None else float(walks.distances(walks.start)[walks.end or 0])
-        return BothBounds(flows, windows), FrontBounds(flows, shortest, walks.max_length)
+        return both, FrontBounds(both.flows, shortest, walks.max_length)
 
     stays = walks.in_reach.sum() == 1  # there is one walk, to stay
     value_now = float(measure([staying(graph)])[0])
@@ -245,6 +250,7 @@ def search_roadmap(
         bounds if turn is None and not stays and (deadline is None or _has_time_for_bound(walks, deadline)) else None,
         began=began,
         deadline=None if deadline is None else share * deadline,
+        first_bound_by=None if deadline is None else deadline,
         gap=gap,
         enough=math.inf if enough is None else value_now - enough,
         max_evaluations=None if max_evaluations is None else math.ceil(share * max_evaluations),
@@ -252,8 +258,11 @@ def search_roadmap(
         clock=clock,
     )
 
-    def way(walk: Walk) -> Way:
-        return Way(evaluations.path(walk), evaluations.action(walk), evaluations.value(walk), evaluations.lengths[walk])
+    def ways(some: Sequence[Walk]) -> tuple[Way, ...]:
+        return tuple(
+            Way(evaluations.path(walk), action, evaluations.value(walk), evaluations.lengths[walk])
+            for walk, action in zip(some, evaluations.actions(some), strict=True)
+        )
 
     def result(stopped_by: str) -> SearchResult:
         every, lengths, values = evaluations.arrays()
@@ -264,9 +273,9 @@ def search_roadmap(
         front = on_front(lengths, objectives)
         walks_on_front: list[Walk] = [every[index] for index in front.tolist()]
         return SearchResult(
-            best=way(best),
-            alternatives=tuple(way(walk) for walk in others),
-            on_front=tuple(map(way, walks_on_front)),
+            best=ways([best])[0],
+            alternatives=ways(others),
+            on_front=ways(walks_on_front),
             front=np.column_stack([lengths[front], objectives[front]]),
             front_bounds=below_front(search.front_bounds, lengths[front], objectives[front]),
             lower_bound=evaluations.value(best) if stays else min(search.lower_bound, evaluations.value(best)),
@@ -275,7 +284,7 @@ def search_roadmap(
             value_with_map_alone=evaluations.value_with_map_alone(best),
             proven_optimal=search.proven or stays or evaluations.value(best) <= search.lower_bound,
             value_now=value_now,
-            shortest=None if goal is None else way(walks.walk(())),
+            shortest=None if goal is None else ways([walks.walk(())])[0],
             max_length=walks.max_length,
             sees_map=evaluations.sees_map,
             any_sees_itself=evaluations.any_sees_itself,

@@ -13,8 +13,11 @@ from topobelief.candidates.closures import ClosureModel
 from topobelief.candidates.observations import ObservationModel
 from topobelief.candidates.roadmap import Roadmap
 from topobelief.errors import InvalidInputError, PlanningError, require_choice
+from topobelief.forms.prior_factors import PriorFactors
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg.block_cholesky import Int32Array
+from topobelief.search.both_bounds import COARSEST
+from topobelief.search.bound import Check, unchecked
 from topobelief.search.criteria import Criterion
 from topobelief.search.flows import FlowBound
 from topobelief.search.layers import Layers, build_layers, num_spots
@@ -28,10 +31,10 @@ from topobelief.world import FreeSpace
 
 _OBJECTIVES = ("error", "map", "joint", "per_pose")
 _ARCS = 400_000  # aimed at: as many layers as make about so many arcs
-_FINEST, _COARSEST = 40, 3  # pieces per spacing
+_FINEST = 40  # pieces per spacing
 _FINE = 10  # pieces per pose; where more are affordable, steps are cheap and splitting does without cells
 _ROWS = 6000  # at most so many for all pairs of a new pose and a cell, kappa for each
-_MOST_CELLS = 80
+_MOST_CELLS = 25
 _MOST_IN_WINDOWS = 1500  # seen poses, the covariance between all of which windows need
 _ARCS_OF_WINDOWS = 3_000_000
 _SAME_PLACE = 1e-9  # metres
@@ -67,6 +70,8 @@ def walk_bounds(
     pieces_per_pose: int | None = None,
     metric: bool = True,
     attitude: Attitude | None = None,
+    factors: PriorFactors | None = None,
+    check: Check = unchecked,
 ) -> tuple[FlowBound, WindowBound | None]:
     """The bounds over the walks from one vertex of a roadmap: by flows, and by windows where there are such.
 
@@ -110,6 +115,10 @@ def walk_bounds(
         False: of the objective as its signature estimates it (`topological_prior`); not for "per_pose".
     attitude
         Of new poses in SE(3), as for `predict_actions`.
+    factors
+        Of the graph, as for `ReducedPrior`.
+    check
+        Called now and then, here and in each step of the bounds; what it raises ends the work.
 
     Raises
     ------
@@ -174,19 +183,17 @@ def walk_bounds(
     if pieces_per_pose is None:
         slack = max_length - from_start[vertices[source[: len(edges)]]] - lengths[edges] - to_go[vertices[target[: len(edges)]]]
         per_metre = 1.5 * float(np.maximum(slack, 0.0).sum())  # arcs, for layers of one metre
-        pieces_per_pose = int(np.clip(_ARCS * spacing / max(per_metre, 1e-9), _COARSEST, _FINEST))
+        pieces_per_pose = affordable(per_metre / spacing)
     delta = spacing / pieces_per_pose
     first_vertex = at_pose if has_lead else int(place[start])
     counts_idle = objective in ("joint", "per_pose")
-    cells = _cells(
-        ways,
-        delta,
-        closures.radius,
-        1 if counts_idle or pieces_per_pose > _FINE else round(_ROWS * spacing / (graph.tangent_dim * whole)),
-    )
+    mixes = objective == "error" and pieces_per_pose <= _FINE  # a flow without cells mixes corridors more than it saves time
+    most_cells = round(_ROWS * spacing / (graph.tangent_dim * whole)) if mixes else 1
+    cells = _cells(ways, delta, closures.radius, most_cells)
     layers = build_layers(ways, first_vertex, remaining, is_end, whole, delta, pieces_per_pose, cells)
     num_new = max(1, int(layers.records.number.max(initial=1)))
     among = int(np.searchsorted(graph.pose_indices, pose))
+    check()
     sightings = find_sightings(graph.poses_alone, ways, among, delta, closures, world, num_new)
     seen = graph.pose_indices[sightings.seen]
     num_seen_poses, observed, most_landmarks = len(seen), None, 0
@@ -197,14 +204,16 @@ def walk_bounds(
         most_landmarks = observations.max_per_pose or 0
     if not len(seen):
         seen, num_seen_poses = np.array([pose]), 1
+    check()
     of_map = _OfMap(probability=closures.probability, min_index_gap=closures.min_index_gap, with_errors=objective == "error")
     if metric:
-        prior: SeenPrior = ReducedPrior(graph, pose, seen, of_closures, observed=observed, **of_map)
+        prior: SeenPrior = ReducedPrior(graph, pose, seen, of_closures, observed=observed, factors=factors, **of_map)
         powers = odometry_powers(graph.group, ways, graph.positions[pose], omega)
     else:
         form = WeightForm.of(objective, graph, omega, of_closures)
         prior = TopologicalPrior.of(graph, pose, seen, of_closures, form, **of_map)
         powers = form.odometry_powers(omega, len(ways.source))
+    check()
     idle = powers[0, 0] * float(counts_idle)
     fewest = max(0, math.ceil((whole - max_length + to_go[start]) / spacing - 1e-6))
     criterion = Criterion.of(objective, prior, idle, num_new, fewest)
@@ -233,9 +242,8 @@ def walk_bounds(
         f"{100 * delta:.3g} cm"
     )
     every = np.arange(len(layers.arcs.source), dtype=np.int32)
-    flows = FlowBound(
-        prior, criterion, rewards, rewards.background(), vertices, max_length, whole - max_length, covers.format("flows"), every
-    )
+    background, told = rewards.background(), covers.format("flows")
+    flows = FlowBound(prior, criterion, rewards, background, vertices, max_length, whole - max_length, told, every, check)
     if (
         not isinstance(prior, ReducedPrior)
         or objective == "error"
@@ -257,7 +265,12 @@ def walk_bounds(
                 return windows, build_layers(ways, first_vertex, remaining, is_end, whole, delta, pieces_per_pose, labels)
             size *= 1.5
 
-    return flows, WindowBound(criterion, windows, rewards, vertices, max_length, covers.format("windows of two poses"))
+    return flows, WindowBound(criterion, windows, rewards, vertices, max_length, covers.format("windows of two poses"), check)
+
+
+def affordable(arcs: float) -> int:
+    """How many layers per new pose are affordable where one has so many arcs."""
+    return int(np.clip(_ARCS / max(arcs, 1e-9), COARSEST, _FINEST))
 
 
 def _cells(ways: Ways, delta: float, size: float, most: int) -> Int32Array:
@@ -266,6 +279,7 @@ def _cells(ways: Ways, delta: float, size: float, most: int) -> Int32Array:
         return np.zeros(int(first_pieces(ways.lengths, delta)[-1]), dtype=np.int32)
     while True:
         cells = cells_of_pieces(ways, delta, size)
-        if cells.max() < min(max(most, 1), _MOST_CELLS):
+        too_many = (cells.max() + 1) / min(most, _MOST_CELLS)
+        if too_many <= 1:
             return cells
-        size *= 1.2
+        size *= max(1.1, 0.9 * math.sqrt(too_many))

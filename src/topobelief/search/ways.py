@@ -107,7 +107,8 @@ def cells_of_pieces(ways: Ways, delta: float, cell: float) -> Int32Array:
     middle = np.minimum((piece + 0.5) * delta, ways.lengths[way])
     places = ways.begin[way] + (middle / ways.lengths[way])[:, None] * (ways.end - ways.begin)[way]
     squares = np.floor((places - places.min(axis=0)) / cell).astype(np.int64)
-    return np.unique(squares, axis=0, return_inverse=True)[1].ravel().astype(np.int32)
+    keys = np.ravel_multi_index(tuple(squares.T), tuple((squares.max(axis=0) + 1).tolist()))
+    return np.unique(keys, return_inverse=True)[1].astype(np.int32)
 
 
 def find_sightings(

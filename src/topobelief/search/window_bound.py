@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from topobelief.arrays import FloatArray, IntArray
+from topobelief.search.bound import Check
 from topobelief.search.criteria import Criterion
 from topobelief.search.layers import Layers
 from topobelief.search.longest_paths import longest_path
@@ -36,9 +37,11 @@ class WindowBound:
         vertices: IntArray,
         max_length: float,
         covers: str,
+        check: Check,
     ) -> None:
         self._criterion, self._make, self._rewards = criterion, make, rewards
         self._vertices, self._max_length, self._covers = vertices, max_length, covers
+        self._check = check
         self._bound = -math.inf
         self._steps = self._work()
         self._finished = False
@@ -84,6 +87,7 @@ class WindowBound:
         weights = arc_weights(layers.arcs, every, worth, criterion.price * rewards.prices, at_end)
         most, toll, lines, found = math.inf, 0.0, list[tuple[float, float]](), list[IntArray]()
         for _ in range(_TOLL_TRIALS):
+            self._check()
             longest = longest_path(layers, every, weights, toll * rewards.driven)
             if longest.value == -math.inf:
                 return []

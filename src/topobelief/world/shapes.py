@@ -206,8 +206,7 @@ class Region:
 
     def __init__(self, shape: Polygon | MultiPolygon) -> None:
         self._shape = shape
-        self._boundary = _shapely.boundary(shape)
-        _shapely.prepare((self._shape, self._boundary))
+        _shapely.prepare(self._shape)
 
     @cached_property
     def _pieces(self) -> tuple[FloatArray, FloatArray]:
@@ -235,4 +234,6 @@ class Region:
 
     def boundary_near(self, starts: FloatArray, ends: FloatArray, distance: float) -> BoolArray:
         """Whether each segment, shapes (N, 2), comes within a distance of the boundary, or exactly to it."""
-        return _shapely.dwithin(self._boundary, segments(starts, ends), distance)
+        near = np.zeros(len(starts), dtype=bool)
+        near[self._segments.query(segments(starts, ends), predicate="dwithin", distance=distance)[0]] = True
+        return near
