@@ -1,8 +1,12 @@
 """Parts of ways that are seen from places."""
 
+from unittest.mock import Mock
+
 import numpy as np
+import pytest
 
 import topobelief as tb
+from topobelief.world import sight
 from topobelief.world.sight import seen_parts
 
 WORLD = tb.World.from_boxes([(3, 3, 4, 7), (6, 1, 6.2, 5), (1, 8, 9, 8.3)], bounds=(0, 0, 10, 10))
@@ -31,3 +35,14 @@ def test_known_shadows():
     assert parts.which.tolist() == [0, 0, 2]
     np.testing.assert_allclose(parts.lower, [0, 7 / 8, 0], atol=1e-8)
     np.testing.assert_allclose(parts.upper, [1 / 8, 1, 1], atol=1e-8)
+
+
+def test_ways_are_looked_at_in_parts_and_what_a_check_raises_ends_it(monkeypatch):
+    rng = np.random.default_rng(1)
+    places, starts, ends = rng.uniform(0, 10, (3, 40, 2))
+    at_once = seen_parts(WORLD, places, starts, ends)
+    monkeypatch.setattr(sight, "_AT_ONCE", 7)
+    for one, other in zip(at_once, seen_parts(WORLD, places, starts, ends), strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-12)
+    with pytest.raises(TimeoutError):
+        seen_parts(WORLD, places, starts, ends, Mock(side_effect=[None, TimeoutError]))

@@ -194,11 +194,11 @@ def walk_bounds(
     num_new = max(1, int(layers.records.number.max(initial=1)))
     among = int(np.searchsorted(graph.pose_indices, pose))
     check()
-    sightings = find_sightings(graph.poses_alone, ways, among, delta, closures, world, num_new)
+    sightings = find_sightings(graph.poses_alone, ways, among, delta, closures, world, num_new, check)
     seen = graph.pose_indices[sightings.seen]
     num_seen_poses, observed, most_landmarks = len(seen), None, 0
     if observations is not None and graph.num_landmarks:
-        landmarks = find_landmarks(graph, ways, delta, observations, world)
+        landmarks = find_landmarks(graph, ways, delta, observations, world, check)
         sightings, seen = sightings.with_more(landmarks), np.concatenate([seen, landmarks.seen])
         observed = observations.information(graph.tangent_dim, graph.group.position_dim)
         most_landmarks = observations.max_per_pose or 0

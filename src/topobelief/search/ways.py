@@ -22,6 +22,7 @@ from topobelief.geometry.segments import distances_to_segments
 from topobelief.graph.pose_graph import PoseGraph
 from topobelief.linalg.block_cholesky import Int32Array
 from topobelief.linalg.compiled import compiled
+from topobelief.search.bound import Check, unchecked
 from topobelief.world import FreeSpace
 from topobelief.world.parts import Parts
 from topobelief.world.sight import seen_parts
@@ -112,7 +113,14 @@ def cells_of_pieces(ways: Ways, delta: float, cell: float) -> Int32Array:
 
 
 def find_sightings(
-    graph: PoseGraph, ways: Ways, pose: int, delta: float, rule: ClosureModel, world: FreeSpace | None, latest: int
+    graph: PoseGraph,
+    ways: Ways,
+    pose: int,
+    delta: float,
+    rule: ClosureModel,
+    world: FreeSpace | None,
+    latest: int,
+    check: Check = unchecked,
 ) -> Sightings:
     """What is seen along each way.
 
@@ -128,15 +136,18 @@ def find_sightings(
     world
     latest
         The largest number of a new pose; poses that are not far enough back even for it are left out.
+    check
     """
-    way, seen, lower, upper = _seen_along(graph, ways, pose, rule, world, latest)
+    way, seen, lower, upper = _seen_along(graph, ways, pose, rule, world, latest, check)
     always = (seen > pose) | (pose - seen + 1 >= rule.min_index_gap)
     nearest = 0 if rule.max_per_pose is None else 3 * rule.max_per_pose - 2
     at, aside = _beside(graph, ways, way, seen)
     return _listed(ways, delta, nearest, way, seen, lower, upper, at, aside, always)
 
 
-def find_landmarks(graph: PoseGraph, ways: Ways, delta: float, model: ObservationModel, world: FreeSpace | None) -> Sightings:
+def find_landmarks(
+    graph: PoseGraph, ways: Ways, delta: float, model: ObservationModel, world: FreeSpace | None, check: Check = unchecked
+) -> Sightings:
     """Landmarks that may be observed along each way: of those, new poses observe at most `model.max_per_pose`, the nearest.
 
     From u metres along a way, a landmark abeam at a and b aside of it is seen at the angle atan2(b, a - u): within half of the
@@ -144,7 +155,7 @@ def find_landmarks(graph: PoseGraph, ways: Ways, delta: float, model: Observatio
 
     Parameters
     ----------
-    graph, ways, delta, world
+    graph, ways, delta, world, check
         As for `find_sightings`.
     model
     """
@@ -162,8 +173,10 @@ def find_landmarks(graph: PoseGraph, ways: Ways, delta: float, model: Observatio
     kept = np.flatnonzero((aside <= model.max_range**2) & (lower <= upper))
     lower, upper = lower[kept], upper[kept]
     if world is not None and model.line_of_sight:
-        places = (graph.positions[seen[kept]], ways.begin[way[kept]], ways.end[way[kept]])
-        parts = seen_parts(world, *(seen_by(world, each) for each in places))
+        place, begin, end = (
+            seen_by(world, each) for each in (graph.positions[seen[kept]], ways.begin[way[kept]], ways.end[way[kept]])
+        )
+        parts = seen_parts(world, place, begin, end, check)
         kept = kept[parts.which]
         length = ways.lengths[way[kept]]
         lower = np.maximum(lower[parts.which], parts.lower * length)
@@ -204,7 +217,7 @@ def _listed(
 
 
 def _seen_along(
-    graph: PoseGraph, ways: Ways, pose: int, rule: ClosureModel, world: FreeSpace | None, latest: int
+    graph: PoseGraph, ways: Ways, pose: int, rule: ClosureModel, world: FreeSpace | None, latest: int, check: Check
 ) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
     """Way, pose, and metres along the way from where to where it may be seen."""
     positions = graph.positions
@@ -221,7 +234,7 @@ def _seen_along(
     half = np.sqrt(np.maximum(rule.radius**2 - np.sum(offset**2, axis=1) + at**2, 0.0))
     lower, upper = np.maximum(at - half, 0.0), np.minimum(at + half, ways.lengths[way])
     if world is not None:
-        parts = _seen_parts(world, ways, positions, way, seen)
+        parts = _seen_parts(world, ways, positions, way, seen, check)
         length = ways.lengths[way][parts.which]
         lower, upper = (
             np.maximum(lower[parts.which], parts.lower * length),
@@ -233,14 +246,14 @@ def _seen_along(
     return way, seen, lower, upper
 
 
-def _seen_parts(world: FreeSpace, ways: Ways, positions: FloatArray, way: IntArray, seen: IntArray) -> Parts:
+def _seen_parts(world: FreeSpace, ways: Ways, positions: FloatArray, way: IntArray, seen: IntArray, check: Check) -> Parts:
     """What of some ways poses see; a way and the way back are looked at once."""
     source, target = ways.source[way], ways.target[way]
     size = int(max(ways.source.max(), ways.target.max())) + 1
     keys = (np.minimum(source, target) * size + np.maximum(source, target)) * len(positions) + seen
     _, one, same = np.unique(keys, return_index=True, return_inverse=True)
-    places = (positions[seen[one]], ways.begin[way[one]], ways.end[way[one]])
-    parts = seen_parts(world, *(seen_by(world, each) for each in places))
+    place, begin, end = (seen_by(world, each) for each in (positions[seen[one]], ways.begin[way[one]], ways.end[way[one]]))
+    parts = seen_parts(world, place, begin, end, check)
     first = np.searchsorted(parts.which, np.arange(len(one) + 1))
     count = np.diff(first)[same]
     which = np.repeat(np.arange(len(way)), count)

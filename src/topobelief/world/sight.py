@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from topobelief.arrays import FloatArray
@@ -10,11 +12,14 @@ from topobelief.world.space import FreeSpace
 from topobelief.world.world import World
 from topobelief.world.world_3d import World3D
 
+_AT_ONCE = 4000  # ways between two checks
 _LINES = 6  # across the lines of sight in space
 _FLAT = 1e-12  # relative area of a triangle below which a place counts as being on the line of the way
 
 
-def seen_parts(world: FreeSpace, places: FloatArray, starts: FloatArray, ends: FloatArray) -> Parts:
+def seen_parts(
+    world: FreeSpace, places: FloatArray, starts: FloatArray, ends: FloatArray, check: Callable[[], None] = lambda: None
+) -> Parts:
     """What is seen of each way from a place of its own; the parts are in the order of the ways.
 
     Nothing that is visible by `visible` is left out. Beyond that, parts may be larger: in the plane by some 1e-9 of a way, and
@@ -26,16 +31,20 @@ def seen_parts(world: FreeSpace, places: FloatArray, starts: FloatArray, ends: F
     world
     places, starts, ends : shape (N, dim)
         A place, and the ends of a way that lies in free space.
+    check
+        Called now and then; what it raises ends the work.
     """
-    inside = np.flatnonzero(world.contains(places))
-    place, start, end = places[inside], starts[inside], ends[inside]
-    if isinstance(world, World):
-        seen = _seen_in_plane(world, place, start, end)
-    elif isinstance(world, World3D):
-        seen = _seen_in_space(world, place, start, end)
-    else:
+    if not isinstance(world, World | World3D):
         raise TypeError(f"expected a World or a World3D, got {type(world).__name__}")
-    return Parts(inside[seen.which], seen.lower, seen.upper)
+    inside = np.flatnonzero(world.contains(places))
+    found = [Parts(inside[:0], np.zeros(0), np.zeros(0))]
+    for first in range(0, len(inside), _AT_ONCE):
+        check()
+        some = inside[first : first + _AT_ONCE]
+        each = places[some], starts[some], ends[some]
+        seen = _seen_in_plane(world, *each) if isinstance(world, World) else _seen_in_space(world, *each)
+        found.append(Parts(some[seen.which], seen.lower, seen.upper))
+    return Parts(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
 
 
 def _seen_in_space(world: World3D, place: FloatArray, start: FloatArray, end: FloatArray) -> Parts:
