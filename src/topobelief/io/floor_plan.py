@@ -7,7 +7,6 @@ it the plan ends where its walls end.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,11 +17,12 @@ from topobelief.io.bags import is_bag
 from topobelief.io.files import StrPath, read_text
 from topobelief.io.map_3d import is_map_3d
 from topobelief.io.ros_map import Unknown, read_ros_map
+from topobelief.io.transforms import FARTHEST
 from topobelief.world import World
 
 _HEADER = ["x_min", "y_min", "x_max", "y_max"]
 _BOUNDS = re.compile(r"#\s*bounds\s*:(.*)")
-_EXPECTED = "four finite numbers x_min, y_min, x_max, y_max with min < max"
+_EXPECTED = "four numbers x_min, y_min, x_max, y_max within 1e9 m with min < max"
 
 
 def read_world(path: StrPath, *, unknown: Unknown = "occupied", topic: str | None = None) -> World:
@@ -100,6 +100,11 @@ def _extent(path: StrPath, line: int, fields: list[str], what: str) -> list[floa
         numbers = [float(field) for field in fields]
     except ValueError:
         numbers = []
-    if len(numbers) == 4 and all(map(math.isfinite, numbers)) and numbers[0] < numbers[2] and numbers[1] < numbers[3]:
+    if (
+        len(numbers) == 4
+        and all(abs(number) <= FARTHEST for number in numbers)
+        and numbers[0] < numbers[2]
+        and numbers[1] < numbers[3]
+    ):
         return numbers
     raise FileError(path, f"expected {what} as {_EXPECTED}, got {' '.join(fields)[:60]!r}", line=line)
