@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike
 from topobelief.arrays import BoolArray, FloatArray, IntArray, ReadOnlyArrays, frozen_floats, frozen_ints
 from topobelief.errors import InvalidActionError, InvalidInputError
 from topobelief.graph.information import checked_information, measures_rotations, of_positions
-from topobelief.graph.pose_graph import PoseGraph, checked_pose_rows
+from topobelief.graph.pose_graph import PoseGraph
+from topobelief.graph.pose_rows import checked_pose_rows
 from topobelief.graph.topology import Topology
 from topobelief.wording import counted
 

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from topobelief.arrays import BoolArray, FloatArray, IntArray, ReadOnlyArrays, frozen_floats, frozen_ints, read_only
+from topobelief.arrays import BoolArray, FloatArray, IntArray, ReadOnlyArrays, frozen_ints, read_only
 from topobelief.errors import InvalidGraphError, InvalidInputError
 from topobelief.geometry import Group, group_of_size
 from topobelief.graph.information import checked_information
@@ -28,9 +28,10 @@ from topobelief.graph.observations import (
     seen_positions,
     within_readings,
 )
+from topobelief.graph.pose_rows import checked_pose_rows, without_rotations
 from topobelief.graph.readings import POSITION, RELATIVE_POSE
 from topobelief.graph.topology import Topology
-from topobelief.graph.variable_kinds import LANDMARK, POSE, first_edges_of, points_among
+from topobelief.graph.variable_kinds import LANDMARK, POSE, first_edges_of, points_among, require_observers
 from topobelief.symbols import find_node, node_name
 from topobelief.wording import counted
 
@@ -111,8 +112,8 @@ class PoseGraph(ReadOnlyArrays):
             raise InvalidGraphError("expected at least one pose, got none")
         topology = Topology(len(checked_poses), edges)
         is_landmark = points_among(kinds, len(checked_poses))
-        checked_poses = _without_rotations(group, checked_poses, is_landmark)
-        _require_poses(is_landmark, topology.edges)
+        checked_poses = without_rotations(group, checked_poses, is_landmark)
+        require_observers(is_landmark, topology.edges)
         observing = is_landmark[topology.edges[:, 1]]
         if measurements is None:
             i, j = topology.edges.T
@@ -121,7 +122,7 @@ class PoseGraph(ReadOnlyArrays):
             checked_measurements, _ = checked_pose_rows(
                 measurements, name="measurements", size=group.pose_size, count=topology.num_edges
             )
-        checked_measurements = _without_rotations(group, checked_measurements, observing)
+        checked_measurements = without_rotations(group, checked_measurements, observing)
         checked, noise = checked_readings(readings, observing), information
         if observing.any():
             noise = within_readings(noise, checked, group)
@@ -381,27 +382,6 @@ class PoseGraph(ReadOnlyArrays):
         )
 
 
-def _without_rotations(group: Group, rows: FloatArray, points: BoolArray) -> FloatArray:
-    """Rows of poses, of points with the rotation of the identity."""
-    if not points.any():
-        return rows
-    cleared = rows.copy()
-    cleared[points, group.position_dim :] = group.identity()[group.position_dim :]
-    return read_only(cleared)
-
-
-def _require_poses(is_landmark: BoolArray, edges: IntArray) -> None:
-    """Raise where nothing is a pose, or a landmark is said to measure."""
-    if is_landmark.all():
-        raise InvalidGraphError("expected at least one pose, got landmarks alone")
-    measuring = np.flatnonzero(is_landmark[edges[:, 0]])
-    if measuring.size:
-        raise InvalidGraphError(
-            f"expected an observation to lead from a pose to a landmark, got edge {measuring[0]} = "
-            f"{tuple(edges[measuring[0]].tolist())} from a landmark; turn it round"
-        )
-
-
 def require_pose_graph(graph: object) -> None:
     """Raise `InvalidInputError` for what is no pose graph; of objects of GTSAM, say what makes one of them."""
     if not isinstance(graph, PoseGraph):
@@ -409,32 +389,3 @@ def require_pose_graph(graph: object) -> None:
             "; from_gtsam makes one of factors and values, or of an ISAM2" if type(graph).__module__.startswith("gtsam") else ""
         )
         raise InvalidInputError(f"expected a PoseGraph, got {type(graph).__name__}{advice}")
-
-
-def checked_pose_rows(
-    values: ArrayLike, *, name: str, size: int | None = None, count: int | None = None
-) -> tuple[FloatArray, Group]:
-    """Poses as rows in canonical representation, read-only, and their group.
-
-    Raises
-    ------
-    InvalidGraphError
-        Where a row is not finite, the shape is wrong, or a quaternion is zero.
-    """
-    array = frozen_floats(values, name=name)
-    if array.size == 0 and size is not None:
-        array = array.reshape(0, size)
-    expected = f"({'n' if count is None else count}, {'3 or 7' if size is None else size})"
-    if array.ndim != 2 or (size is not None and array.shape[1] != size) or (count is not None and len(array) != count):
-        raise InvalidGraphError(f"expected {name} of shape {expected}, got {array.shape}")
-    if array.shape[1] not in (3, 7):
-        raise InvalidGraphError(f"expected {name} of shape {expected}, got {array.shape}")
-    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
-    if bad.size:
-        raise InvalidGraphError(f"expected finite {name}, got nan or inf in row {bad[0]}")
-    group = group_of_size(array.shape[1])
-    if group.pose_size == 7:
-        zero = np.flatnonzero(np.linalg.norm(array[:, 3:], axis=1) < 1e-6)
-        if zero.size:
-            raise InvalidGraphError(f"expected unit quaternions in {name}, got a zero one in row {zero[0]}")
-    return read_only(group.normalized(array)), group

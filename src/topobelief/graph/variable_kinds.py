@@ -71,6 +71,18 @@ def points_among(kinds: ArrayLike | None, num_nodes: int) -> BoolArray:
     return read_only(np.isin(names, [name for name, kind in VARIABLE_KINDS.items() if not kind.turns]))
 
 
+def require_observers(is_landmark: BoolArray, edges: IntArray) -> None:
+    """Raise where nothing is a pose, or a landmark is said to measure."""
+    if is_landmark.all():
+        raise InvalidGraphError("expected at least one pose, got landmarks alone")
+    measuring = np.flatnonzero(is_landmark[edges[:, 0]])
+    if measuring.size:
+        raise InvalidGraphError(
+            f"expected an observation to lead from a pose to a landmark, got edge {measuring[0]} = "
+            f"{tuple(edges[measuring[0]].tolist())} from a landmark; turn it round"
+        )
+
+
 def first_edges_of(points: BoolArray, targets: IntArray) -> BoolArray:
     """Which edges are the first that leads to a point: they carry its pad.
 

@@ -49,7 +49,6 @@ from topobelief.world.space import require_room_for, seen_by
 
 _NUM_CANDIDATES = 60  # vertices to lead walks through
 _DIFFERENT = 0.05  # share of the length limit by which alternatives differ (Fréchet)
-_SAME_PLACE = 1e-9  # metres
 _SHARE_OF_REFINEMENT = 0.4  # of the time and of the evaluations
 _TO_MAKE_BOUND = 0.8e-6  # seconds a metre of the limit and edge in reach, on graphs of 2700 to 10 000 poses
 

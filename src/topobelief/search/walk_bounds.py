@@ -23,6 +23,7 @@ from topobelief.search.flows import FlowBound
 from topobelief.search.layers import Layers, build_layers, num_spots
 from topobelief.search.reduced_prior import ReducedPrior
 from topobelief.search.rewards import Rewards, odometry_powers
+from topobelief.search.tolls import slack
 from topobelief.search.topological_prior import OBJECTIVES, SeenPrior, TopologicalPrior, WeightForm
 from topobelief.search.ways import Ways, cells_of_pieces, find_landmarks, find_sightings, first_pieces
 from topobelief.search.window_bound import WindowBound
@@ -38,7 +39,6 @@ _MOST_CELLS = 25
 _MOST_IN_WINDOWS = 1500  # seen poses, the covariance between all of which windows need
 _ARCS_OF_WINDOWS = 3_000_000
 _SAME_PLACE = 1e-9  # metres
-_ROUNDING = 1e-9  # relative; bounds are lowered by it
 
 
 class _OfMap(TypedDict):
@@ -144,7 +144,8 @@ def walk_bounds(
         raise InvalidInputError(f"expected edge_costs of at least 0 for each of {len(roadmap.edges)} edges, got {extra.shape}")
     end = start if return_to_start and goal is None else goal
     to_go = np.zeros(len(roadmap.vertices)) if end is None else roadmap.distances_to(end)
-    if not to_go[start] <= max_length * (1 + _ROUNDING):
+    limit = max_length + slack(max_length)
+    if not to_go[start] <= limit:
         raise PlanningError(
             f"expected a length of at least {to_go[start]:.2f} m, that of the shortest path, got {max_length:g} m; allow more"
         )
@@ -153,7 +154,7 @@ def walk_bounds(
     lengths = roadmap.lengths
     edges = np.tile(np.arange(len(lengths)), 2)
     source, target = np.r_[a, b], np.r_[b, a]
-    alive = from_start[source] + lengths[edges] + to_go[target] <= max_length * (1 + _ROUNDING) + _SAME_PLACE
+    alive = from_start[source] + lengths[edges] + to_go[target] <= limit
     alive &= lengths[edges] > 0
     edges, source, target = edges[alive], source[alive], target[alive]
     kept = np.unique(np.concatenate([source, target, [start]]))
@@ -181,8 +182,8 @@ def walk_bounds(
     is_end[at_pose] = False
     remaining = np.concatenate([to_go[kept], [lead_in + to_go[start]]])
     if pieces_per_pose is None:
-        slack = max_length - from_start[vertices[source[: len(edges)]]] - lengths[edges] - to_go[vertices[target[: len(edges)]]]
-        per_metre = 1.5 * float(np.maximum(slack, 0.0).sum())  # arcs, for layers of one metre
+        spare = max_length - from_start[vertices[source[: len(edges)]]] - lengths[edges] - to_go[vertices[target[: len(edges)]]]
+        per_metre = 1.5 * float(np.maximum(spare, 0.0).sum())  # arcs, for layers of one metre
         pieces_per_pose = affordable(per_metre / spacing)
     delta = spacing / pieces_per_pose
     first_vertex = at_pose if has_lead else int(place[start])
