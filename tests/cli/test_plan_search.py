@@ -10,6 +10,7 @@ import pytest
 import topobelief as tb
 from topobelief.candidates.polyline import path_length
 from topobelief.cli import plan_mode
+from topobelief.forms import prior_factors
 from topobelief.io.path_formats import read_path
 from topobelief.search import roadmap_search
 
@@ -53,6 +54,24 @@ def test_the_graph_is_factored_once_for_all_goals_and_the_decision(topobelief, o
     monkeypatch.setattr(roadmap_search, "Planner", None)
     plan = document(topobelief, to_goal(office, "--goal", 5, 10))
     assert {action["goal"] for action in plan["actions"]} == {0, 1}
+
+
+def test_all_that_evaluations_need_of_a_large_map_is_made_before_the_time_of_the_search(topobelief, office, monkeypatch):
+    """As on graphs whose errors are taken from blocks of the inverse until solutions are asked for."""
+    monkeypatch.setattr(prior_factors, "COMPILED_SIZE", 0)
+    made: list[str] = []
+    search, solve = roadmap_search.search_roadmap, prior_factors.solutions
+
+    def told(*given, **more):
+        made.append("search")
+        result = search(*given, **more)
+        made.append("searched")
+        return result
+
+    monkeypatch.setattr(prior_factors, "solutions", lambda *given: (made.append("solutions"), solve(*given))[1])
+    monkeypatch.setattr(roadmap_search, "search_roadmap", told)
+    assert topobelief(to_goal(office)).code == 0
+    assert made[:3] == ["solutions", "search", "searched"]
 
 
 def test_the_document_is_what_the_library_finds(topobelief, office):

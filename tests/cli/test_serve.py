@@ -91,6 +91,7 @@ def test_the_front_is_walked_along_by_keyboard(tab: Any) -> None:
     page.fill("#limit", "24")
     page.click("#ask")
     answered(page)
+    page.mouse.move(1, 1)  # the page scrolls to the slider, and a way that comes to lie under the mouse would be shown
     page.focus("#slider")
     page.keyboard.press("Home")
     assert page.inner_text("#why").startswith("staying")

@@ -18,6 +18,7 @@ from topobelief.search.evaluations import Evaluations
 from topobelief.search.flows import FlowBound
 from topobelief.search.local_search import LocalSearch, spread_vias
 from topobelief.search.result import SearchResult
+from topobelief.search.walk_bounds import spare_metres
 from topobelief.search.walks import Walks
 
 CLOSURES = tb.ClosureModel(radius=1.5, max_per_pose=2, probability=1.0, min_index_gap=3)
@@ -463,3 +464,14 @@ def test_the_front_has_bounds_that_fall_and_stay_below_it(cost):
     values = values_of(graph, roadmap, walks, objective="error", closures=CLOSURES)
     assert result.bound_within(limit) <= values.min() + 1e-9 * abs(values.min())
     assert search(graph, roadmap, **(options | {"turn": 100.0}), max_evaluations=100).front_bounds.shape == (0, 2)
+
+
+def test_what_the_shortest_walk_through_each_edge_leaves_of_the_limit():
+    _, roadmap = scene(3)
+    spare = spare_metres(roadmap, 0, 1, 30.0).reshape(2, -1)
+    for edge, (a, b) in enumerate(roadmap.edges.tolist()):
+        for way, (source, target) in enumerate([(a, b), (b, a)]):
+            length = roadmap.distances_to(source)[0] + roadmap.lengths[edge] + roadmap.distances_to(1)[target]
+            assert spare[way, edge] == pytest.approx(30.0 - length)
+    assert spare.max() == pytest.approx(30.0 - roadmap.distances_to(1)[0])
+    assert (spare_metres(roadmap, 0, None, 30.0) >= spare.ravel()).all()

@@ -21,7 +21,8 @@ from topobelief.cli.plan_candidates import Proposals
 from topobelief.cli.plan_ends import Goal, shown
 from topobelief.cli.plan_world import told_of_poses_outside
 from topobelief.errors import NotOptimizedWarning
-from topobelief.graph.action import staying
+from topobelief.graph.action import Action
+from topobelief.graph.pose_graph import PoseGraph
 from topobelief.planning.decision import Decision
 from topobelief.planning.planner import Planner
 from topobelief.search.anytime import SearchProgress
@@ -121,7 +122,7 @@ def search(
         Where a goal cannot be reached, or not within the length.
     """
     with reporter.stage("prior"):  # kernels are loaded and the map is factored, so that the time of the search is its own
-        planner.entropies([staying(planner.graph)])
+        planner.entropies([_one_loop(planner.graph)])
     results: list[SearchResult] = []
     for goal in goals or [None]:
         seconds = None if limits.seconds is None else limits.seconds / max(1, len(goals))
@@ -129,6 +130,13 @@ def search(
         reporter.say(_work(found, begin, goal))
         results.append(found)
     return gathered(results, goals)
+
+
+def _one_loop(graph: PoseGraph) -> Action:
+    """A new pose at the last one, which sees the first: evaluating it makes all that evaluating ways needs of the map."""
+    new = graph.num_nodes
+    edges = [(graph.last_pose, new), (new, graph.pose_indices[0])]
+    return Action(graph.poses[[graph.last_pose]], edges, np.eye(graph.tangent_dim))
 
 
 def gathered(results: Sequence[SearchResult], goals: Sequence[Goal], *, points: int = POINTS_TOLD) -> Searched:

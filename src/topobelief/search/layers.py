@@ -22,6 +22,7 @@ import numpy as np
 from topobelief.arrays import BoolArray, FloatArray, IntArray
 from topobelief.linalg.block_cholesky import Int32Array
 from topobelief.linalg.compiled import compiled
+from topobelief.search.bound import Check, unchecked
 from topobelief.search.ways import Ways, first_pieces
 
 _TIE = 1e-9  # of a layer: lengths that differ by less are equal
@@ -104,6 +105,7 @@ def build_layers(
     delta: float,
     pieces_per_pose: int,
     labels: Int32Array,
+    check: Check = unchecked,
 ) -> Layers:
     """The layers of the walks from a vertex.
 
@@ -121,6 +123,7 @@ def build_layers(
     delta, pieces_per_pose
     labels : shape (P,)
         Of the pieces of all ways (`ways.first_pieces`), from 0 on.
+    check
     """
     num_vertices, num_labels = len(to_go), int(labels.max()) + 1
     first = first_pieces(ways.lengths, delta)
@@ -133,7 +136,9 @@ def build_layers(
     reach = (out, order, ways.target, ways.lengths, to_go, labels, first, vertex, label, spot, pieces_per_pose)
     begin = int(spot[first_vertex, 0])
     nearest, furthest = _reached(*reach, begin, num_layers, delta, max_length)
+    check()
     sizes = _arcs(*reach, is_end, nearest, furthest, delta, max_length, begin, False, *_room(0, 0))
+    check()
     arcs, records = _room(sizes[0], sizes[1])
     _arcs(*reach, is_end, nearest, furthest, delta, max_length, begin, True, arcs, records)
     whole = np.maximum(np.floor(ways.lengths / delta - _TIE), 0).astype(np.int32)

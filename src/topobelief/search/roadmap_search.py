@@ -42,7 +42,7 @@ from topobelief.search.local_search import LocalSearch, spread_vias
 from topobelief.search.refinement import refine_best
 from topobelief.search.result import SearchResult, Way
 from topobelief.search.topological_prior import OBJECTIVES, constant
-from topobelief.search.walk_bounds import affordable, walk_bounds
+from topobelief.search.walk_bounds import affordable, spare_metres, walk_bounds
 from topobelief.search.walks import Walk, Walks
 from topobelief.world import FreeSpace
 from topobelief.world.space import require_room_for, seen_by
@@ -50,7 +50,7 @@ from topobelief.world.space import require_room_for, seen_by
 _NUM_CANDIDATES = 60  # vertices to lead walks through
 _DIFFERENT = 0.05  # share of the length limit by which alternatives differ (Fréchet)
 _SHARE_OF_REFINEMENT = 0.4  # of the time and of the evaluations
-_TO_MAKE_BOUND = 0.8e-6  # seconds a metre of the limit and edge in reach, on graphs of 2700 to 10 000 poses
+_TO_MAKE_BOUND = 3e-6  # seconds for each new pose that the limit leaves room for beyond the shortest walk through an edge
 
 
 def search_roadmap(
@@ -246,7 +246,7 @@ def search_roadmap(
     search = AnytimeSearch(
         evaluations,
         local,
-        bounds if turn is None and not stays and (deadline is None or _has_time_for_bound(walks, deadline)) else None,
+        bounds if turn is None and not stays and (deadline is None or _has_time_for_bound(walks, spacing, deadline)) else None,
         began=began,
         deadline=None if deadline is None else share * deadline,
         first_bound_by=None if deadline is None else deadline,
@@ -333,11 +333,10 @@ def _check_numbers(
         raise InvalidInputError(f"expected num_alternatives of at least 0, got {num_alternatives}")
 
 
-def _has_time_for_bound(walks: Walks, deadline: float) -> bool:
+def _has_time_for_bound(walks: Walks, spacing: float, deadline: float) -> bool:
     """Whether a bound would know anything in about the time that is left to it."""
-    edges = walks.in_reach[walks.roadmap.edges].all(axis=1)
-    seconds = _TO_MAKE_BOUND * walks.max_length * int(np.count_nonzero(edges))
-    return seconds <= (1 - WARM_UP_SHARE) * deadline
+    spare = spare_metres(walks.roadmap, walks.start, walks.end, walks.max_length)
+    return _TO_MAKE_BOUND * float(np.maximum(spare, 0.0).sum()) / spacing <= (1 - WARM_UP_SHARE) * deadline
 
 
 def _walks_within(

@@ -8,6 +8,7 @@ from typing import TypedDict
 import numpy as np
 from numpy.typing import ArrayLike
 
+from topobelief.arrays import FloatArray
 from topobelief.candidates.attitude import Attitude, Legs, lifted
 from topobelief.candidates.closures import ClosureModel
 from topobelief.candidates.observations import ObservationModel
@@ -144,19 +145,17 @@ def walk_bounds(
         raise InvalidInputError(f"expected edge_costs of at least 0 for each of {len(roadmap.edges)} edges, got {extra.shape}")
     end = start if return_to_start and goal is None else goal
     to_go = np.zeros(len(roadmap.vertices)) if end is None else roadmap.distances_to(end)
-    limit = max_length + slack(max_length)
-    if not to_go[start] <= limit:
+    if not to_go[start] <= max_length + slack(max_length):
         raise PlanningError(
             f"expected a length of at least {to_go[start]:.2f} m, that of the shortest path, got {max_length:g} m; allow more"
         )
-    from_start = roadmap.distances_to(start)
     a, b = roadmap.edges.T
     lengths = roadmap.lengths
     edges = np.tile(np.arange(len(lengths)), 2)
     source, target = np.r_[a, b], np.r_[b, a]
-    alive = from_start[source] + lengths[edges] + to_go[target] <= limit
-    alive &= lengths[edges] > 0
-    edges, source, target = edges[alive], source[alive], target[alive]
+    spare = spare_metres(roadmap, start, end, max_length)
+    alive = (spare >= -slack(max_length)) & (lengths[edges] > 0)
+    edges, source, target, spare = edges[alive], source[alive], target[alive], spare[alive]
     kept = np.unique(np.concatenate([source, target, [start]]))
     vertices = np.concatenate([kept, [-1]])  # the last one: the pose where the robot is
     place = np.full(len(roadmap.vertices), -1)
@@ -182,7 +181,6 @@ def walk_bounds(
     is_end[at_pose] = False
     remaining = np.concatenate([to_go[kept], [lead_in + to_go[start]]])
     if pieces_per_pose is None:
-        spare = max_length - from_start[vertices[source[: len(edges)]]] - lengths[edges] - to_go[vertices[target[: len(edges)]]]
         per_metre = 1.5 * float(np.maximum(spare, 0.0).sum())  # arcs, for layers of one metre
         pieces_per_pose = affordable(per_metre / spacing)
     delta = spacing / pieces_per_pose
@@ -191,7 +189,7 @@ def walk_bounds(
     mixes = objective == "error" and pieces_per_pose <= _FINE  # a flow without cells mixes corridors more than it saves time
     most_cells = round(_ROWS * spacing / (graph.tangent_dim * whole)) if mixes else 1
     cells = _cells(ways, delta, closures.radius, most_cells)
-    layers = build_layers(ways, first_vertex, remaining, is_end, whole, delta, pieces_per_pose, cells)
+    layers = build_layers(ways, first_vertex, remaining, is_end, whole, delta, pieces_per_pose, cells, check)
     num_new = max(1, int(layers.records.number.max(initial=1)))
     among = int(np.searchsorted(graph.pose_indices, pose))
     check()
@@ -267,6 +265,23 @@ def walk_bounds(
             size *= 1.5
 
     return flows, WindowBound(criterion, windows, rewards, vertices, max_length, covers.format("windows of two poses"), check)
+
+
+def spare_metres(roadmap: Roadmap, start: int, end: int | None, max_length: float) -> FloatArray:
+    """What the shortest walk through each edge leaves of the limit, metres; all edges, then all in the other direction.
+
+    Parameters
+    ----------
+    roadmap
+    start, end
+        Vertices; None where walks may end anywhere.
+    max_length
+        Metres.
+    """
+    to_go = np.zeros(len(roadmap.vertices)) if end is None else roadmap.distances_to(end)
+    a, b = roadmap.edges.T
+    shortest = roadmap.distances_to(start)[np.r_[a, b]] + np.tile(roadmap.lengths, 2) + to_go[np.r_[b, a]]
+    return max_length - shortest
 
 
 def affordable(arcs: float) -> int:
